@@ -7,7 +7,6 @@
 
 mod bus;
 mod cluster;
-mod cold;
 
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -18,13 +17,12 @@ use serde::{Deserialize, Serialize};
 
 pub use self::bus::{BrokerAddress, MqttConfig, NatsConfig};
 pub use self::cluster::ClusterConfig;
-pub use self::cold::ColdConfig;
 use offbd_service::access::jwt::ExpectedClaims;
 use offbd_service::{
     CommunicationSettings, Limits, NotificationSettings, OutOfRange, RequestLimits, Retention,
     TargetPolicy, WorkerLimits, config_section,
 };
-use offbd_store::{ColdDirectory, Location};
+use offbd_store::Location;
 
 /// Name of the database file in the data directory.
 const DATABASE_FILE: &str = "offbd.sqlite";
@@ -60,8 +58,6 @@ pub struct Config {
     pub rates: RatesConfig,
     pub workers: WorkerLimits,
     pub retention: RetentionConfig,
-    /// Where ended sessions go that leave the database; `None` if they stay there.
-    pub cold: Option<ColdConfig>,
     pub communication: CommunicationSettings,
     pub notifications: NotificationsConfig,
 }
@@ -375,7 +371,6 @@ impl Default for Config {
             rates: RatesConfig::default(),
             workers: WorkerLimits::default(),
             retention: RetentionConfig::default(),
-            cold: None,
             communication: CommunicationSettings::default(),
             notifications: NotificationsConfig::default(),
         }
@@ -472,7 +467,6 @@ impl Config {
         self.nats.as_ref().map_or(Ok(()), NatsConfig::check)?;
         self.mqtt.as_ref().map_or(Ok(()), |mqtt| mqtt.check(self.nats.is_some()))?;
         self.retention.check()?;
-        self.cold.as_ref().map_or(Ok(()), ColdConfig::check)?;
         self.communication.check()?;
         self.notifications.check()?;
         let location = self.location()?;
@@ -508,12 +502,6 @@ impl Config {
         Location::of_url(url).map_err(|reason| ConfigError::Invalid { key: "database", reason })
     }
 
-    /// The directory of cold data, if there is one.
-    #[must_use]
-    pub fn cold_directory(&self) -> Option<ColdDirectory> {
-        self.cold.as_ref().map(ColdConfig::directory)
-    }
-
     /// The service's limits.
     #[must_use]
     pub fn service_limits(&self) -> Limits {
@@ -521,7 +509,6 @@ impl Config {
             requests: self.limits.clone(),
             workers: self.workers.clone(),
             retention: self.retention.retention(),
-            cold_after: self.cold.as_ref().and_then(ColdConfig::after),
             communication: self.communication.clone(),
             notifications: self.notifications.settings(),
             ..Limits::default()
@@ -663,9 +650,6 @@ mod tests {
             ("[traces]\nshare = 1.5", "traces.share"),
             ("[traces]\nshare = nan", "traces.share"),
             ("[retention]\ndays = 30\nfault_days = 29", "retention.fault_days"),
-            ("[cold]\nafter_days = 1", "directory"),
-            ("[cold]\ndirectory = ''", "cold.directory"),
-            ("[cold]\ndirectory = 'd'\nafter_days = 99999", "cold."),
             ("database = 'postgres://a:secret@h:port/d'", "database"),
         ] {
             let error = error(toml, &[]);

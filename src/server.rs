@@ -38,9 +38,7 @@ use crate::config::{ClusterConfig, Config, LogFormat};
 use offbd_http::{AccessPolicy, App, BodyBudget, ExtraRoutes, RateLimit, RateLimits};
 use offbd_service::access::Provider;
 use offbd_service::{Clock, Limits, Service, Workers};
-use offbd_store::{
-    CheckReport, ColdDirectory, Location, NodeIdentity, Partitions, Store, StoreError,
-};
+use offbd_store::{CheckReport, Location, NodeIdentity, Partitions, Store, StoreError};
 
 /// How often a blocking thread is asked for: often enough for a device that waits, and rarely
 /// enough to cost nothing.
@@ -102,7 +100,6 @@ pub async fn start(config: Config) -> Result<Server> {
 /// As for [`start`].
 pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Server> {
     config.check()?;
-    config.cold_directory().map_or(Ok(()), |cold| check_cold(&cold))?;
     allocator::keep_large_blocks_apart();
     offbd_http::gather_metrics();
     let tls = config.tls.as_ref().map(Tls::read).transpose()?;
@@ -117,7 +114,6 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         None => None,
     };
     let (store, writer) = open(&location, node.as_ref()).await?;
-    let store = store.with_cold(config.cold_directory());
     let listener = TcpListener::bind(config.listen).await.with_context(|| {
         format!(
             "`listen`: cannot listen on {} (`--listen` chooses another address, port 0 a free one)",
@@ -205,13 +201,6 @@ async fn start_service(
         store.close().await;
     }
     Ok(started?)
-}
-
-/// Checks that the directory of cold data is there. It is not created, because it may be a
-/// file system that is not mounted.
-fn check_cold(directory: &ColdDirectory) -> Result<()> {
-    let root = directory.root().display();
-    directory.check().with_context(|| format!("`cold.directory`: cannot read {root}"))
 }
 
 /// Rebuilds the engines of long recordings while requests are served already.
@@ -420,7 +409,7 @@ pub async fn migrate(config: &Config) -> Result<usize> {
 /// If there is no embedded store, `file` exists, or it cannot be written.
 pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
     let location = config.location()?;
-    let result = offbd_store::back_up(&location, file, config.cold_directory().as_ref()).await;
+    let result = offbd_store::back_up(&location, file).await;
     result.with_context(|| format!("cannot back up the store {location}"))
 }
 
@@ -431,8 +420,7 @@ pub async fn back_up(config: &Config, file: &Path) -> Result<()> {
 pub async fn restore(config: &Config, file: &Path, replace: bool) -> Result<()> {
     let location = config.location()?;
     let _lock = lock(&location).await?;
-    let cold = config.cold_directory();
-    let result = offbd_store::restore(&location, file, replace, cold.as_ref()).await;
+    let result = offbd_store::restore(&location, file, replace).await;
     let hint = match &result {
         Err(StoreError::Exists { .. }) if !replace => " without --replace",
         _ => "",
@@ -503,6 +491,6 @@ pub async fn check_store(config: &Config) -> Result<Option<CheckReport>> {
     if location.file().is_some_and(|file| !file.exists()) {
         return Ok(None);
     }
-    let report = offbd_store::check(&location, config.cold_directory().as_ref()).await;
+    let report = offbd_store::check(&location).await;
     report.map(Some).with_context(|| format!("cannot check the store {location}"))
 }

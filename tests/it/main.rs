@@ -15,7 +15,6 @@ mod bus;
 mod cli;
 mod cluster;
 #[cfg(feature = "parquet")]
-mod cold;
 mod crash;
 mod damage;
 mod engine_snapshot;

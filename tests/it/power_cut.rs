@@ -139,7 +139,7 @@ async fn stored(client: &Client, asset: &str, samples: &[Sample], at: &str) -> (
 }
 
 async fn check(location: &Location, at: &str) {
-    let report = offbd::store::check(location, None).await;
+    let report = offbd::store::check(location).await;
     let report = report.unwrap_or_else(|error| panic!("{at}: {location}: {error}"));
     assert_eq!(report.findings, Vec::<String>::new(), "{at}: {location}");
 }

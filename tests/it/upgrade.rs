@@ -10,13 +10,17 @@ mod schema;
 use offbd::store::Store;
 use schema::{Filled, JOURNAL, latest};
 use serde_json::{Value, json};
+use sqlx::Executor;
 
 use crate::support::process::{Process, ended};
-use crate::support::{Client, config, eventually, judged, rig};
+use crate::support::{Client, config, connection, eventually, judged, rig, url};
 
 /// Samples of the session that is open while the schema changes, and how many of them are
 /// sent before.
 const OPEN: (usize, usize) = (900, 500);
+
+/// The first schema without samples in files.
+const NO_COLD_FILES: usize = 23;
 
 /// What the service shows, and the first schema that holds all of it.
 const VIEWS: [(&str, usize); 9] = [
@@ -117,7 +121,7 @@ async fn upgrade_each(schemas: impl Iterator<Item = usize>, is_stopped: bool) {
         assert_eq!(views(&process.client, n).await, shown[n - 1], "schema {n}");
         go_on(&process.client, n).await;
         drop(process);
-        let report = offbd::store::check(&location, None).await.unwrap();
+        let report = offbd::store::check(&location).await.unwrap();
         assert_eq!(report.findings, Vec::<String>::new(), "schema {n}");
     }
 }
@@ -130,4 +134,23 @@ async fn each_schema_without_a_journal_is_brought_to_the_present_one() {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn each_schema_with_a_journal_is_brought_to_the_present_one() {
     upgrade_each(JOURNAL..=latest(), false).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_database_with_samples_in_files_is_not_migrated() {
+    let data = tempfile::tempdir().unwrap();
+    let process = Process::start(data.path());
+    process.client.asset("a").await;
+    drop(process);
+    let filled = Filled::new(data.path()).await;
+    filled.take_back_to(NO_COLD_FILES - 1).await;
+    let mut db = connection(&url(data.path())).await;
+    let file = "INSERT INTO cold_file VALUES ('s', 'a', 1, 's.parquet', 1, '', 1)";
+    db.execute(file).await.unwrap();
+    let location = config(data.path()).location().unwrap();
+    let error = Store::open(&location).await.map(drop).unwrap_err().to_string();
+    assert!(error.contains("back_up_and_restore_with_the_version_before"), "{error}");
+    let kept: i64 =
+        sqlx::query_scalar("SELECT COUNT(*) FROM cold_file").fetch_one(&mut db).await.unwrap();
+    assert_eq!(kept, 1);
 }

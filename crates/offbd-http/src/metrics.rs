@@ -91,10 +91,6 @@ metrics! {
     "offbd_bus_unsafe" Gauge Later => "1 if the NATS server may lose messages, see the log";
     "offbd_cluster_nodes" Gauge Read(|app| Some(app.service.cluster(None).nodes.len() as f64))
         => "Nodes of the cluster that are alive";
-    "offbd_cold_bytes_total" Counter ZERO => "Bytes of the files that hold moved sessions";
-    "offbd_cold_failures_total" Counter ZERO
-        => "Files of sessions not written, verified or removed";
-    "offbd_cold_files_total" Counter ZERO => "Sessions whose samples were moved to a file";
     "offbd_commit_failures_total" Counter ZERO => "Failed commits, including retried ones";
     "offbd_commit_seconds" Seconds Later => "Duration of a commit";
     "offbd_commit_sets" Sizes Later => "Write sets in a commit";

@@ -133,7 +133,6 @@ impl From<StoreError> for ServiceError {
             | StoreError::DamagedLog { .. }
             | StoreError::Chunk { .. }
             | StoreError::Incomplete { .. }
-            | StoreError::Cold { .. }
             | StoreError::Snapshot { .. }
             | StoreError::Journal { .. }
             | StoreError::UnknownValue { .. } => Self::corrupt(error),

@@ -49,9 +49,8 @@
 //! - `communication`: finds rigs whose data stay away.
 //! - `mutes`: the monitors that a person has muted.
 //! - `tags`: what is permitted as a tag of a rig.
-//! - `upkeep`: deletion in parts, retention, cold data, the watchdog of ingest.
+//! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `background`: long computations on threads of a low priority.
-//! - `cold_files`: ended sessions as files outside the database.
 //! - `simulation`, a test: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
 //!
@@ -64,7 +63,6 @@ mod asset_quota;
 mod background;
 mod clock;
 mod cluster;
-mod cold_files;
 mod communication;
 mod error;
 mod job;
@@ -91,7 +89,6 @@ pub use offbd_store::RecordingReader;
 
 pub use clock::{Clock, parse_timestamp};
 pub use cluster::Route;
-pub use cold_files::cold_directory;
 pub use communication::CommunicationSettings;
 pub use error::ServiceError;
 pub use limits::{Limits, OutOfRange, RETRY_AFTER_S, RequestLimits, Retention, WorkerLimits};

@@ -121,9 +121,6 @@ pub struct Limits {
     pub snapshot_interval: i64,
     /// How long recordings are kept.
     pub retention: Retention,
-    /// Age at which the samples of an ended session leave the database, if there is a directory
-    /// for them; `None` for never.
-    pub cold_after: Option<Duration>,
     /// When the data of a rig count as lost.
     pub communication: CommunicationSettings,
     /// How notifications are sent.
@@ -140,7 +137,6 @@ impl Default for Limits {
             commit_queue: 1024,
             snapshot_interval: 16_384,
             retention: Retention::default(),
-            cold_after: None,
             communication: CommunicationSettings::default(),
             notifications: NotificationSettings::default(),
         }

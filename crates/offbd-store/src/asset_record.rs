@@ -153,13 +153,8 @@ async fn ended_sessions(
     let mut query = QueryBuilder::new(
         "SELECT id, asset, name, first_part, last_seq,
              (SELECT MAX(max_t_s) FROM (
-                 SELECT max_t_s FROM (SELECT max_t_s FROM chunk WHERE chunk.session = session.id
-                                      ORDER BY first_index DESC LIMIT 2) AS hot
-                 UNION ALL
-                 SELECT max_t_s FROM (SELECT max_t_s FROM cold_chunk
-                                      WHERE cold_chunk.session = session.id
-                                      ORDER BY first_index DESC LIMIT 2) AS cold) AS newest)
-                 AS newest_t_s
+                 SELECT max_t_s FROM chunk WHERE chunk.session = session.id
+                 ORDER BY first_index DESC LIMIT 2) AS newest) AS newest_t_s
          FROM session WHERE id IN (",
     );
     query.bind_list(&ids)?.push(") ORDER BY opened_at DESC, id DESC");

@@ -6,24 +6,17 @@ use std::path::{Path, PathBuf};
 use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 
 use super::check::{check_copy, check_pages};
-use super::cold::{self, ColdDirectory};
 use super::file::{create_private, file_url, sync_directory_of};
 use super::page_checksums::{self, open};
 use super::{Location, MIGRATIONS, StoreError};
 
 /// Copies the database file at `location` to the new file `copy`, also while a service uses
-/// it. The copy is a consistent state of the database with all commits before the call,
-/// with the samples in the files of its `cold` data; its pages have checksums, its contents
-/// are checked, and it is on the disk on return.
+/// it. The copy is a consistent state of the database with all commits before the call; its
+/// pages have checksums, its contents are checked, and it is on the disk on return.
 ///
 /// # Errors
-/// [`StoreError`] if there is no such database, `copy` exists, it cannot be written, or a file
-/// of cold data cannot be read.
-pub async fn back_up(
-    location: &Location,
-    copy: &Path,
-    cold: Option<&ColdDirectory>,
-) -> Result<(), StoreError> {
+/// [`StoreError`] if there is no such database, `copy` exists, or it cannot be written.
+pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError> {
     let file = location.file().ok_or(StoreError::NotSqlite)?;
     check_absent(copy)?;
     let part = with_suffix(copy, ".part");
@@ -34,27 +27,21 @@ pub async fn back_up(
     page_checksums::create(&part).await?;
     let mut written = open(&part).await?;
     copy_rows(&mut written, file).await?;
-    cold::bring_back(&mut written, cold).await?;
     written.close().await?;
     let mut written = open(&part).await?;
-    check_copy(&mut written, location, None).await?;
+    check_copy(&mut written, location).await?;
     written.close().await?;
     publish(&part, copy)
 }
 
 /// Replaces the database file at `location` by `copy`, with the schema brought to this
-/// version, and its `cold` data checked. An existing file is an error or, with `replace`,
+/// version. An existing file is an error or, with `replace`,
 /// renamed to `*.replaced`. No service may use the database meanwhile.
 ///
 /// # Errors
 /// [`StoreError`] if the copy is damaged, is not a database of offbd, or is newer than
 /// this version; then nothing is changed.
-pub async fn restore(
-    location: &Location,
-    copy: &Path,
-    replace: bool,
-    cold: Option<&ColdDirectory>,
-) -> Result<(), StoreError> {
+pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<(), StoreError> {
     let file = location.file().ok_or(StoreError::NotSqlite)?;
     if !replace {
         check_absent(file)?;
@@ -70,7 +57,7 @@ pub async fn restore(
     // Fails if the file is not a database of offbd.
     sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
     MIGRATIONS.run_direct(None, &mut connection, false).await?;
-    check_copy(&mut connection, location, cold).await?;
+    check_copy(&mut connection, location).await?;
     connection.close().await?;
     if file.exists() {
         set_aside(file)?;
@@ -175,10 +162,10 @@ mod tests {
         let mut assets: Vec<_> = (0..400).map(asset).collect();
         writer.commit(&mut [ChangeSet::unpartitioned(&mut assets)]).await.unwrap();
         let copy = Location::File(folder.path().join("copy"));
-        back_up(&location, copy.file().unwrap(), None).await.unwrap();
+        back_up(&location, copy.file().unwrap()).await.unwrap();
         writer.close().await.unwrap();
-        let report = crate::check(&copy, None).await.unwrap();
-        assert_eq!(report, crate::check(&location, None).await.unwrap());
+        let report = crate::check(&copy).await.unwrap();
+        assert_eq!(report, crate::check(&location).await.unwrap());
         assert_eq!((report.page_checksums, report.n_documents), (Some(true), 400));
         assert_eq!(report.findings, [""; 0]);
         let header = std::fs::read(copy.file().unwrap()).unwrap();

@@ -9,7 +9,6 @@ use serde::de::IgnoredAny;
 use sqlx::{AnyConnection, Connection, Executor};
 
 use super::codec::ChunkKey;
-use super::cold::{self, ColdDirectory, ColdFileRow};
 use super::from_row::from_row;
 use super::journal::JournalRun;
 use super::read::VISIBLE;
@@ -59,32 +58,28 @@ impl CheckReport {
     }
 }
 
-/// Checks the contents of the database at `location`, and the files in the directory of its
-/// `cold` data, also while a service uses them. Nothing is changed.
+/// Checks the contents of the database at `location`, also while a service uses it. Nothing
+/// is changed.
 ///
 /// # Errors
 /// [`StoreError`] if the database cannot be opened or has the schema of another version.
-pub async fn check(
-    location: &Location,
-    cold: Option<&ColdDirectory>,
-) -> Result<CheckReport, StoreError> {
+pub async fn check(location: &Location) -> Result<CheckReport, StoreError> {
     let mut db = location.reader().await?;
     check_version(&mut db).await?;
-    let report = check_contents(&mut db, location, cold).await?;
+    let report = check_contents(&mut db, location).await?;
     db.close().await?;
     Ok(report)
 }
 
-/// Checks the contents of a copy of the database at `location`, with its `cold` data.
+/// Checks the contents of a copy of the database at `location`.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] with the first finding.
 pub(super) async fn check_copy(
     copy: &mut AnyConnection,
     location: &Location,
-    cold: Option<&ColdDirectory>,
 ) -> Result<(), StoreError> {
-    whole(check_contents(copy, location, cold).await?)
+    whole(check_contents(copy, location).await?)
 }
 
 /// Checks the structure of an SQLite database, whatever its schema.
@@ -107,7 +102,6 @@ fn whole(report: CheckReport) -> Result<(), StoreError> {
 async fn check_contents(
     db: &mut AnyConnection,
     location: &Location,
-    cold: Option<&ColdDirectory>,
 ) -> Result<CheckReport, StoreError> {
     let mut report = CheckReport::default();
     if location.file().is_some() {
@@ -115,7 +109,7 @@ async fn check_contents(
         check_structure(db, &mut report).await?;
     }
     check_open(db, location, &mut report).await;
-    check_ended(db, cold, &mut report).await;
+    check_ended(db, &mut report).await;
     check_snapshots(db, &mut report).await;
     check_documents(db, &mut report).await;
     Ok(report)
@@ -235,74 +229,19 @@ async fn check_open(db: &mut AnyConnection, location: &Location, report: &mut Ch
     }
 }
 
-async fn check_ended(
-    db: &mut AnyConnection,
-    cold: Option<&ColdDirectory>,
-    report: &mut CheckReport,
-) {
+async fn check_ended(db: &mut AnyConnection, report: &mut CheckReport) {
     let found = sessions(db, "ended").await;
     let found = found.unwrap_or_else(|error| {
         report.add(format!("the sessions cannot be read: {error}"));
         Vec::new()
     });
     for session in found {
-        let n = check_recording(db, cold, &session, report).await;
+        let n = check_chunks(db, &session, report).await;
         if n != session.n_samples && is_visible(db, &session.id).await {
             let CheckedSession { id, n_samples } = &session;
             report.add(format!("session {id}: {n} of {n_samples} samples are there"));
         }
         report.n_sessions += 1;
-    }
-}
-
-/// Checks the samples of the ended `session`: in its file, or else in the chunks. Returns their
-/// number.
-async fn check_recording(
-    db: &mut AnyConnection,
-    cold: Option<&ColdDirectory>,
-    session: &CheckedSession,
-    report: &mut CheckReport,
-) -> i64 {
-    if let Some(n) = check_cold(db, cold, session, report).await {
-        return n;
-    }
-    let n = check_chunks(db, session, report).await;
-    if n == session.n_samples {
-        return n;
-    }
-    // It may have moved meanwhile.
-    check_cold(db, cold, session, report).await.unwrap_or(n)
-}
-
-/// Checks the file of `session`. Returns the number of its samples, or of those that are
-/// expected if a finding says why they are not there; `None` if it has no file.
-async fn check_cold(
-    db: &mut AnyConnection,
-    cold: Option<&ColdDirectory>,
-    session: &CheckedSession,
-    report: &mut CheckReport,
-) -> Option<i64> {
-    let sql = "SELECT * FROM cold_file WHERE session = $1 AND moved_at IS NOT NULL";
-    let row = sqlx::query_as(sql).bind(&session.id).fetch_optional(&mut *db).await;
-    let row: Option<ColdFileRow> = match row {
-        Ok(row) => Some(row?),
-        Err(error) => {
-            report.add(format!("the file of session {}: {}", session.id, StoreError::from(error)));
-            None
-        }
-    };
-    match cold::verify(cold, row?).await {
-        Ok(n) => {
-            report.n_samples += n.unsigned_abs();
-            Some(n)
-        }
-        Err(error) => {
-            // It may have been deleted meanwhile.
-            if is_visible(db, &session.id).await {
-                report.add(error.to_string());
-            }
-            Some(session.n_samples)
-        }
     }
 }
 

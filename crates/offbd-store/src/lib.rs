@@ -17,9 +17,8 @@
 //!    the end of a session, its *tail* (`tail.rs`), are merged into larger ones.
 //!
 //! So every sample is in the journal or in a chunk, never in both or in neither, and
-//! readers combine the two. The samples of an ended session may leave the database for a file
-//! (`cold.rs`). With SQLite, a second connection copies the write-ahead log
-//! into the database file while commits go on (`checkpoint.rs`).
+//! readers combine the two. With SQLite, a second connection copies the write-ahead log into
+//! the database file while commits go on (`checkpoint.rs`).
 
 mod access;
 mod alarm;
@@ -28,7 +27,6 @@ mod backup;
 mod check;
 mod checkpoint;
 pub mod codec;
-mod cold;
 mod execute;
 mod expiry;
 mod file;
@@ -70,7 +68,6 @@ pub use alarm::{AlarmWrite, CommunicationChange, CommunicationRow, MuteRow, Note
 pub use asset_record::{AssetRecord, EndedSessionRow, MAX_ASSETS_AT_ONCE, MAX_ENDED_SESSIONS};
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
-pub use cold::{ColdDirectory, ColdFileRow, ColdWrite, ReadSamples, SampleStream};
 pub use expiry::SessionSize;
 pub use location::Location;
 pub use notification::{
@@ -126,9 +123,6 @@ pub enum StoreError {
     Chunk { session: String, first_index: i64, source: codec::CodecError },
     #[error("session {session} is damaged: sample {found} of {expected} is missing")]
     Incomplete { session: String, found: i64, expected: i64 },
-    /// The file with the samples of a session, below the directory of cold data.
-    #[error("session {session}: the file {path} of its samples {reason}")]
-    Cold { session: String, path: String, reason: String },
     #[error("session {session} has been deleted")]
     Deleted { session: String },
     #[error("the snapshot of session {session} after {n_samples} samples is damaged")]
@@ -258,7 +252,6 @@ impl StoreError {
             | Self::PartitionCount { .. }
             | Self::Chunk { .. }
             | Self::Incomplete { .. }
-            | Self::Cold { .. }
             | Self::Snapshot { .. }
             | Self::Deleted { .. }
             | Self::Journal { .. }
@@ -296,7 +289,6 @@ pub struct Store {
     pool: AnyPool,
     location: Location,
     journal: journal::Journal,
-    cold: Option<ColdDirectory>,
 }
 
 impl Store {
@@ -337,7 +329,7 @@ impl Store {
 
     fn with(location: &Location, writer: Writer) -> Result<(Self, Writer), StoreError> {
         let (pool, location, journal) = (location.readers()?, location.clone(), writer.journal());
-        Ok((Self { pool, location, journal, cold: None }, writer))
+        Ok((Self { pool, location, journal }, writer))
     }
 
     /// Brings the database at `location` to this version's schema. Returns the number of

@@ -242,11 +242,8 @@ impl Store {
     /// The latest time in the last two chunks of `session`, s.
     pub async fn newest_t_s(&self, session: &str) -> Result<Option<f64>, StoreError> {
         let newest = "SELECT MAX(max_t_s) FROM (
-             SELECT max_t_s FROM (SELECT max_t_s FROM chunk WHERE session = $1
-                                  ORDER BY first_index DESC LIMIT 2) AS hot
-             UNION ALL
-             SELECT max_t_s FROM (SELECT max_t_s FROM cold_chunk WHERE session = $1
-                                  ORDER BY first_index DESC LIMIT 2) AS cold) AS newest";
+             SELECT max_t_s FROM chunk WHERE session = $1
+             ORDER BY first_index DESC LIMIT 2) AS newest";
         Ok(sqlx::query_scalar(newest).bind(session).fetch_one(&self.pool).await?)
     }
 
@@ -377,29 +374,14 @@ impl Store {
         push_times(&mut query, times)?;
         query.push(" ORDER BY first_index DESC LIMIT ").bind(i64::from(limit) + 1)?;
         let rows: Vec<(i64, Vec<u8>)> = query.rows().fetch_all(&self.pool).await?;
-        let n_cold = self.n_cold_chunks(session, times).await?;
-        if rows.len() + n_cold > limit as usize {
+        if rows.len() > limit as usize {
             return Ok(None);
-        }
-        if n_cold > 0 {
-            // The file has all samples, those of chunks that are not deleted yet too.
-            return self.cold_samples(session, is_asked).await.map(Some);
         }
         for (first_index, data) in rows {
             let samples = decode_chunk(&data, ChunkKey { session, first_index })?;
             found.extend(samples.into_iter().filter(is_asked));
         }
         Ok(Some(found))
-    }
-
-    /// How many former chunks of `session` may have samples at one of the `times`, which
-    /// ascend.
-    async fn n_cold_chunks(&self, session: &str, times: &[f64]) -> Result<usize, StoreError> {
-        let mut query = QueryBuilder::new("SELECT COUNT(*) FROM cold_chunk WHERE session = ");
-        query.bind(session.to_owned())?;
-        push_times(&mut query, times)?;
-        let (n,): (i64,) = query.rows().fetch_one(&self.pool).await?;
-        Ok(usize::try_from(n).unwrap_or_default())
     }
 
     /// The actions of people in `session`, in order.

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use super::codec::ChunkKey;
-use super::cold::ColdReader;
 use super::{SessionRow, Store, StoreError, decode_chunk};
 use offbd_core::vocabulary::{Sample, TimeRange};
 
@@ -18,8 +17,6 @@ pub struct RecordingReader {
     range: TimeRange,
     /// Chunks that are read already, by their first indexes.
     ahead: BTreeMap<i64, Vec<u8>>,
-    /// The file of the samples, once the database has them no longer.
-    cold: Option<ColdReader>,
 }
 
 impl Store {
@@ -28,7 +25,7 @@ impl Store {
     pub fn recording(&self, session: &SessionRow, first: i64) -> RecordingReader {
         let (next, end) = (first.max(0), session.progress.n_samples);
         let (store, session, range) = (self.clone(), session.id.clone(), TimeRange::ALL);
-        RecordingReader { store, session, next, end, range, ahead: BTreeMap::new(), cold: None }
+        RecordingReader { store, session, next, end, range, ahead: BTreeMap::new() }
     }
 
     /// Returns a reader of the samples of `session` whose times are in `range`.
@@ -42,7 +39,7 @@ impl Store {
     ) -> Result<RecordingReader, StoreError> {
         let (next, end) = self.indexes(session, range).await?;
         let (store, session) = (self.clone(), session.id.clone());
-        Ok(RecordingReader { store, session, next, end, range, ahead: BTreeMap::new(), cold: None })
+        Ok(RecordingReader { store, session, next, end, range, ahead: BTreeMap::new() })
     }
 
     /// Returns indexes of `session` between which all samples with times in `range` are: the
@@ -64,10 +61,7 @@ impl Store {
             "SELECT MIN(CASE WHEN max_t_s >= $2 THEN first_index END),
                  MAX(CASE WHEN min_t_s <= $3 THEN first_index + n END),
                  COALESCE(MAX(first_index + n), 0)
-             FROM (SELECT first_index, n, min_t_s, max_t_s FROM chunk WHERE session = $1
-                   UNION ALL
-                   SELECT first_index, n, min_t_s, max_t_s FROM cold_chunk WHERE session = $1)
-                 AS stored",
+             FROM chunk WHERE session = $1",
         )
         .bind(&session.id)
         .bind(range.from_s)
@@ -117,8 +111,7 @@ impl RecordingReader {
     ///
     /// # Errors
     /// [`StoreError::Deleted`] if the session is deleted meanwhile;
-    /// [`StoreError::Incomplete`], [`StoreError::Chunk`] and [`StoreError::Cold`] if the
-    /// recording is damaged;
+    /// [`StoreError::Incomplete`] and [`StoreError::Chunk`] if the recording is damaged;
     /// [`StoreError::Database`].
     pub async fn next(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
         while self.next < self.end {
@@ -135,20 +128,11 @@ impl RecordingReader {
         Ok(None)
     }
 
-    /// Reads samples from the next one on: from the database or, if they have left it, from
-    /// their file.
+    /// Reads samples from the next one on.
     async fn stored(&mut self) -> Result<Option<Vec<Sample>>, StoreError> {
-        if let Some(samples) = self.take_ahead()? {
-            return Ok(Some(samples));
+        match self.take_ahead()? {
+            Some(samples) => Ok(Some(samples)),
+            None => self.store.samples_from(&self.session, self.next).await,
         }
-        if self.cold.is_none() {
-            if let Some(samples) = self.store.samples_from(&self.session, self.next).await? {
-                return Ok(Some(samples));
-            }
-            self.cold = self.store.cold_reader(&self.session, self.next).await?;
-        }
-        let Some(cold) = &mut self.cold else { return Ok(None) };
-        let samples = cold.next_part().await?;
-        Ok((!samples.is_empty()).then_some(samples))
     }
 }

@@ -229,18 +229,6 @@ async fn insert(connection: &mut AnyConnection, chunks: &[NewChunk<'_>]) -> Resu
     Ok(())
 }
 
-/// Stores `samples` of `session` as chunks.
-pub(super) async fn insert_run(
-    connection: &mut AnyConnection,
-    session: &str,
-    first_index: i64,
-    samples: &[Sample],
-    rest: Packing,
-) -> Result<(), StoreError> {
-    let chunks: Vec<_> = cut(session, first_index, samples, rest).collect();
-    insert(connection, &chunks).await
-}
-
 /// Joins the small chunks of `tail` with `run` and stores the result as full chunks and a
 /// rest. Returns the new tail.
 async fn merge(

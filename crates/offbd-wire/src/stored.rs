@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::verdict::SummaryView;
 use super::words::{CodeWord, KindWord};
 use offbd_core::diagnosis::{
-    AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, PositionJump, ServoAnswer,
-    StatusByte, Suspicion,
+    AxisEvidence, Candidate, Evidence, FaultMemory, FaultRecord, InUse, PositionJump, StatusByte,
+    Suspicion,
 };
 use offbd_core::engine::JUDGEMENT;
 use offbd_core::vocabulary::{FaultCode, PerAxis, SimTime};
@@ -93,8 +93,8 @@ struct StoredInUse {
 struct StoredEvidence {
     t_s: Option<f64>,
     window_s: f64,
-    x: StoredAxis,
-    y: StoredAxis,
+    x: AxisEvidence,
+    y: AxisEvidence,
     unseen_s: f64,
     #[serde(default)]
     missing_share: f64,
@@ -112,38 +112,6 @@ struct StoredEvidence {
 struct StoredJump {
     t_s: f64,
     size_m: f64,
-}
-
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct StoredAxis {
-    command_rad: Option<f64>,
-    position_m: Option<f64>,
-    velocity_m_s: Option<f64>,
-    measured_m_s2: Option<f64>,
-    twin_m_s2: Option<f64>,
-    limit_m_s2: f64,
-    enabled: bool,
-    #[serde(default)]
-    nats: f64,
-    #[serde(default)]
-    path_error_m: Option<f64>,
-    #[serde(default)]
-    path_limit_m: Option<f64>,
-    #[serde(default)]
-    answer: Option<StoredAnswer>,
-    #[serde(default)]
-    identical_s: f64,
-}
-
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct StoredAnswer {
-    offset_m_s2: f64,
-    offset_error_m_s2: f64,
-    gain: f64,
-    gain_error: f64,
-    delay_s: f64,
-    delay_error_s: f64,
-    likelihoods: [f64; 6],
 }
 
 /// Sessions and people behind a fault record: where and when the fault occurred, who
@@ -292,8 +260,8 @@ impl StoredEvidence {
             healthy_scatter_m,
         },
             t_s: evidence.at.map(|t| t.seconds()),
-            x: StoredAxis::of(&evidence.axes.x),
-            y: StoredAxis::of(&evidence.axes.y),
+            x: evidence.axes.x,
+            y: evidence.axes.y,
             jump: evidence.jump.map(|jump| StoredJump { t_s: jump.at_s, size_m: jump.size_m }),
         )
     }
@@ -304,49 +272,16 @@ impl StoredEvidence {
             healthy_scatter_m,
         },
             at: self.t_s.and_then(SimTime::new),
-            axes: PerAxis { x: self.x.axis(), y: self.y.axis() },
+            axes: PerAxis { x: self.x, y: self.y },
             jump: self.jump.map(|jump| PositionJump { at_s: jump.t_s, size_m: jump.size_m }),
         )
-    }
-}
-
-impl StoredAxis {
-    fn of(axis: &AxisEvidence) -> Self {
-        copied!(axis => Self {
-            command_rad, position_m, velocity_m_s, measured_m_s2, twin_m_s2, limit_m_s2, enabled,
-            nats, path_error_m, path_limit_m, identical_s,
-        },
-            answer: axis.answer.as_ref().map(StoredAnswer::of),
-        )
-    }
-
-    fn axis(&self) -> AxisEvidence {
-        copied!(self => AxisEvidence {
-            command_rad, position_m, velocity_m_s, measured_m_s2, twin_m_s2, limit_m_s2, enabled,
-            nats, path_error_m, path_limit_m, identical_s,
-        },
-            answer: self.answer.as_ref().map(StoredAnswer::answer),
-        )
-    }
-}
-
-impl StoredAnswer {
-    const fn of(answer: &ServoAnswer) -> Self {
-        copied!(answer => Self {
-            offset_m_s2, offset_error_m_s2, gain, gain_error, delay_s, delay_error_s, likelihoods,
-        })
-    }
-
-    const fn answer(&self) -> ServoAnswer {
-        copied!(self => ServoAnswer {
-            offset_m_s2, offset_error_m_s2, gain, gain_error, delay_s, delay_error_s, likelihoods,
-        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use offbd_core::diagnosis::ServoAnswer;
     use offbd_core::vocabulary::FaultKind;
 
     #[test]
@@ -392,6 +327,29 @@ mod tests {
         let after: StoredMemory = serde_json::from_str(&json).unwrap();
         let after = after.memory().unwrap();
         assert_eq!(after, before);
+    }
+
+    /// The evidence of an axis in the form of earlier versions, the first of which had no more.
+    #[test]
+    fn the_evidence_of_an_axis_is_stored_by_these_names() {
+        let first = r#"{"command_rad":0.1,"position_m":null,"velocity_m_s":null,
+            "measured_m_s2":-0.5,"twin_m_s2":null,"limit_m_s2":0.2,"enabled":true}"#;
+        let axis: AxisEvidence = serde_json::from_str(first).unwrap();
+        let expected = AxisEvidence {
+            command_rad: Some(0.1),
+            measured_m_s2: Some(-0.5),
+            limit_m_s2: 0.2,
+            enabled: true,
+            ..AxisEvidence::default()
+        };
+        assert_eq!(axis, expected);
+        let answer = Some(ServoAnswer { gain: 0.5, ..ServoAnswer::default() });
+        let stored = serde_json::to_string(&AxisEvidence { answer, ..axis }).unwrap();
+        let names = "command_rad position_m velocity_m_s measured_m_s2 twin_m_s2 limit_m_s2 enabled
+            nats path_error_m path_limit_m answer offset_m_s2 offset_error_m_s2 gain gain_error
+            delay_s delay_error_s likelihoods identical_s";
+        let found: Vec<&str> = stored.split('"').skip(1).step_by(2).collect();
+        assert_eq!(found, names.split_whitespace().collect::<Vec<_>>());
     }
 
     /// A record as version 0.1 stored it, which was also the form of the API.

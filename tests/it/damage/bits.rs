@@ -186,7 +186,7 @@ impl Stopped {
 
     /// Returns whether a check names the damage.
     async fn is_found(&self) -> bool {
-        match store::check(&Location::File(self.file.clone()), None).await {
+        match store::check(&Location::File(self.file.clone())).await {
             Ok(report) => !report.findings.is_empty(),
             Err(error) => is_named(&error.to_string()),
         }

@@ -14,7 +14,7 @@ pub const JOURNAL: usize = 6;
 const CHECKSUMS: usize = 10;
 
 /// All tables, those first to which others refer.
-const TABLES: [&str; 28] = [
+const TABLES: [&str; 26] = [
     "asset",
     "session",
     "chunk",
@@ -41,8 +41,6 @@ const TABLES: [&str; 28] = [
     "note",
     "remark",
     "tag",
-    "cold_file",
-    "cold_chunk",
 ];
 
 /// The counter that became a column of `partition`.

@@ -8,8 +8,9 @@ use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, SimTime};
 use serde::{Deserialize, Serialize};
 
 /// The quantities of one axis at one moment. Accelerations are over the estimation
-/// window.
+/// window. Faults are stored with it, by the names of its fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct AxisEvidence {
     /// Command in force, rad.
     pub command_rad: Option<f64>,

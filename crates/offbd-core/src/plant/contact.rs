@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::{Ball, Plate};
-use crate::vocabulary::{Axis, Invalid, in_range, positive};
+use crate::vocabulary::{Invalid, in_range, positive};
 
 /// The parameters of the contact; immutable.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -214,15 +214,6 @@ impl Ground {
         match self {
             Self::Endless => f64::INFINITY,
             Self::Plate(plate) => plate.edge_distance_m(x_m, y_m),
-        }
-    }
-
-    /// Distance from the centre to the edge along `axis`, m.
-    #[must_use]
-    pub fn reach_m(&self, axis: Axis) -> f64 {
-        match self {
-            Self::Endless => f64::INFINITY,
-            Self::Plate(plate) => plate.half_extent_m(axis),
         }
     }
 }

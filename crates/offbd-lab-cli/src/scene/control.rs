@@ -163,7 +163,7 @@ fn sample(step: &ControlStep) -> Sample {
 /// Draws both errors above both outputs.
 fn figure(scene_run: &SceneRun, steps: &[ControlStep]) -> Figure {
     let over = |name: &str, i: usize, of: fn(&ControlStep, usize) -> f64| {
-        plots::line(name, i, plots::over_time(steps, |step| (step.at_s, of(step, i))))
+        plots::line(name, i, steps.iter().map(|step| (step.at_s, of(step, i))).collect())
     };
     let errors = ["along x", "along y"].into_iter().enumerate();
     let errors = errors.map(|(i, name)| over(name, i, |step, i| -step.position[i])).collect();

@@ -86,7 +86,7 @@ impl OutputFolder {
     }
 
     pub(super) fn figure(&self, name: &str, figure: &Figure) -> anyhow::Result<()> {
-        let drawing = svg(figure)?;
+        let drawing = svg(figure);
         put(&self.announced(&format!("{name}.svg")), drawing.as_bytes())?;
         put(&self.announced(&format!("{name}.png")), &png(&drawing)?)
     }

@@ -6,7 +6,6 @@ mod decide;
 mod files;
 mod laws;
 mod plots;
-mod polyline;
 mod recorded;
 mod report;
 mod rig;

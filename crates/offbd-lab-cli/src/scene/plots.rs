@@ -1,6 +1,5 @@
 //! Drawings of runs: position over time, the path on the plate, two bodies side by side.
 
-use super::polyline::simplified;
 use super::scene_run::{Sampled, SceneRun};
 use super::words;
 use offbd_core::plant::{Motion, Plate, PlateShape};
@@ -21,11 +20,6 @@ const MARGIN: f64 = 0.06;
 /// Range drawn beyond the plate if the ball falls off, as a share of the plate's half
 /// extent; chosen.
 const BEYOND: f64 = 0.8;
-
-/// Returns the points of a line over time, simplified.
-pub(super) fn over_time<T>(values: &[T], of: impl Fn(&T) -> (f64, f64)) -> Vec<(f64, f64)> {
-    simplified(values.iter().map(of).collect())
-}
 
 pub(super) fn line(name: &str, look: usize, points: Vec<(f64, f64)>) -> Series {
     Series::new(name, Look::of(look), Stroke::Line, points)
@@ -63,7 +57,7 @@ fn ran(scene_run: &SceneRun) -> String {
 /// Draws x and y over time.
 pub(super) fn position(scene_run: &SceneRun) -> Figure {
     let of = |name: &str, i: usize| {
-        line(name, i, over_time(&scene_run.samples, |(t, at)| (*t, at.position[i])))
+        line(name, i, scene_run.samples.iter().map(|(t, at)| (*t, at.position[i])).collect())
     };
     let series = vec![of("x", 0), of("y", 1)];
     let mut panel = time_panel("position on the plate (m)", scene_run.scene.duration_s, series);
@@ -114,7 +108,7 @@ pub(super) fn path(scene_run: &SceneRun) -> Figure {
     let [x, y] = with_margin(ranges);
     // Points outside the axes are not drawn, so the path ends at the first one.
     let seen = |p: &&(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
-    let path = simplified(points.iter().take_while(seen).copied().collect());
+    let path = points.iter().take_while(seen).copied().collect();
     series.push(line("path of the centre", 0, path));
     let (x, y, panel_height) = equal_scales(x, y);
     let mut panel = Panel::new("", Axis::new("x (m)", x), Axis::new("y (m)", y));
@@ -195,8 +189,7 @@ pub(super) fn side_by_side(scene_runs: &[SceneRun]) -> Figure {
             lines.map(|(i, scene_run)| line(body(scene_run), i, points(scene_run))).collect();
         time_panel("way from the start (m)", duration_s, lines)
     };
-    let (plain, mut log) =
-        (panel(|scene_run| simplified(distance(scene_run))), panel(logarithmic_distance));
+    let (plain, mut log) = (panel(distance), panel(distance));
     let distances = log.series.iter().flat_map(|series| series.points.iter());
     log.y.scale = Scale::log_around(distances.map(|p| p.1), MARGIN);
     let names: Vec<&str> = scene_runs.iter().map(body).collect();
@@ -211,10 +204,4 @@ fn body(scene_run: &SceneRun) -> &'static str {
 fn distance(scene_run: &SceneRun) -> Vec<(f64, f64)> {
     let start = scene_run.scene.initial.position.xy();
     scene_run.samples.iter().map(|(t, at)| (*t, (at.position.xy() - start).norm())).collect()
-}
-
-/// Returns the distance over time for a logarithmic axis, without zeros.
-fn logarithmic_distance(scene_run: &SceneRun) -> Vec<(f64, f64)> {
-    let logs = distance(scene_run).into_iter().filter(|p| p.1 > 0.0).map(|(t, way)| (t, way.ln()));
-    simplified(logs.collect()).into_iter().map(|(t, ln)| (t, ln.exp())).collect()
 }

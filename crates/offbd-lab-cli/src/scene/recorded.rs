@@ -147,10 +147,10 @@ impl RecordedRun {
         let (start, points) = (self.points[0].at, self.points_on_plate());
         let mut series = Vec::new();
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
-            let twin = plots::over_time(points, |p| (p.at - start, p.ball.position[i]));
+            let twin = points.iter().map(|p| (p.at - start, p.ball.position[i])).collect();
             series.push(plots::line(&format!("{}, twin", axis.as_str()), 2 * i, twin));
             let seen = points.iter().filter_map(|p| Some((p.at - start, p.measured[axis]?)));
-            let seen = plots::over_time(&seen.collect::<Vec<_>>(), |p| *p);
+            let seen: Vec<(f64, f64)> = seen.collect();
             if !seen.is_empty() {
                 series.push(plots::line(&format!("{}, measured", axis.as_str()), 2 * i + 1, seen));
             }

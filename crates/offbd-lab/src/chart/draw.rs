@@ -1,96 +1,107 @@
 //! Draws a figure as SVG: title and subtitle, a grid of panels, and one legend beneath
 //! them, where it covers no data.
 
-use plotters::chart::{ChartBuilder, ChartContext};
-use plotters::prelude::{Cartesian2d, IntoDrawingArea, SVGBackend};
-use plotters::style::text_anchor::{HPos, VPos};
-use plotters::style::{BLACK, Color, IntoTextStyle, RGBColor, WHITE};
+use std::fmt::Write;
 
-use super::canvas::{Area, CHARACTER, DrawResult, MARGIN, WIDTH, message, text_style, write_text};
-use super::error::ChartError;
 use super::figure::{Figure, Mark, Panel, Series, Stroke};
-use super::legend::{self, LegendEntry};
-use super::marker;
+use super::look::Look;
 use super::scale::Scale;
-use super::stroke::draw_stroke;
 
-/// Size of the title, pixels. All sizes are chosen so that the smallest is 13 pixels at
-/// half the width.
+/// Width of a drawing, pixels. Chosen: readable at half that width; all sizes of text are
+/// chosen so that the smallest is 13 pixels there.
+const WIDTH: f64 = 1800.0;
+/// Margin of the drawing, pixels.
+const MARGIN: f64 = 36.0;
+/// Size of the title, pixels.
 const TITLE: f64 = 42.0;
 /// Size of the subtitle, pixels.
 const SUBTITLE: f64 = 29.0;
 /// Size of labels of axes and titles of panels, pixels.
 const LABEL: f64 = 28.0;
-/// Size of tick labels, pixels.
+/// Size of tick labels and of the legend, pixels.
 const TICK: f64 = 26.0;
+/// Estimated mean width of a character relative to the size of the text, rounded up.
+const CHARACTER: f64 = 0.56;
+/// Space left of the axes for labels, unless names need more, and right, above (without a
+/// title) and below them, pixels.
+const BESIDE: [f64; 4] = [128.0, 22.0, 16.0, 100.0];
+/// Height of a row of the legend, pixels.
+const ROW: f64 = 44.0;
+/// Width of a sample in the legend, and space after it and after its name, pixels.
+const SAMPLE: [f64; 3] = [70.0, 14.0, 36.0];
+/// Limits of the height of a panel with equal scales, pixels; chosen to be readable.
+const HEIGHTS: (f64, f64) = (600.0, 1400.0);
 
-const GREY: RGBColor = RGBColor(70, 70, 70);
-const GRID: RGBColor = RGBColor(214, 214, 214);
-const FAINT: RGBColor = RGBColor(238, 238, 238);
+const BLACK: &str = "#000000";
+const GREY: &str = "#464646";
 
-type Axes<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
+/// A point of a drawing, pixels from its upper left corner.
+type Pixel = (f64, f64);
+
 /// Draws the figure as SVG 1.1.
-///
-/// # Errors
-/// [`ChartError::Draw`] if a panel is too small for its axes.
-pub fn svg(figure: &Figure) -> Result<String, ChartError> {
-    let mut text = String::new();
-    let legend = legend::rows(figure);
-    let head = head_height(figure);
+#[must_use]
+pub fn svg(figure: &Figure) -> String {
     let columns = figure.columns.max(1);
-    let rows = figure.panels.len().div_ceil(columns);
-    let panels = figure.panel_height * rows as u32;
-    let height = head + panels + legend::height(&legend);
-    let area = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
-    draw(figure, &area, &legend, (head, panels, rows))
-        .and_then(|()| area.present().map_err(message))
-        .map_err(|reason| ChartError::Draw { figure: figure.title.clone(), reason })?;
-    drop(area);
-    Ok(text)
-}
-
-fn draw(
-    figure: &Figure,
-    area: &Area<'_>,
-    legend: &[Vec<LegendEntry>],
-    (head, panels, rows): (u32, u32, usize),
-) -> DrawResult {
-    area.fill(&WHITE).map_err(message)?;
-    draw_head(figure, area)?;
-    let columns = figure.columns.max(1);
-    let (_, below) = area.split_vertically(head);
-    let (middle, _) = below.split_vertically(panels);
-    let grid = middle.margin(0, 0, MARGIN - 12, MARGIN).split_evenly((rows, columns));
-    for (place, panel) in grid.iter().zip(&figure.panels) {
-        draw_panel(panel, place, area)?;
+    let subtitle = wrapped(&figure.subtitle);
+    let head = MARGIN + 74.0 + 38.0 * subtitle.len() as f64;
+    let panel_height = f64::from(figure.panel_height);
+    let below = head + panel_height * figure.panels.len().div_ceil(columns) as f64;
+    let legend = legend_rows(figure);
+    let height = below + 12.0 + ROW * legend.len() as f64 + MARGIN;
+    let mut drawing = Drawing(format!(
+        "<svg width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" \
+         xmlns=\"http://www.w3.org/2000/svg\" font-family=\"sans-serif\">\n"
+    ));
+    drawing.rectangle((0.0, 0.0), (WIDTH, height), "#FFFFFF");
+    drawing.text(&figure.title, TITLE, "start", (MARGIN, MARGIN + 36.0), BLACK);
+    for (i, line) in subtitle.iter().enumerate() {
+        drawing.text(line, SUBTITLE, "start", (MARGIN, MARGIN + 84.0 + 38.0 * i as f64), GREY);
     }
-    legend::draw(legend, area, (head + panels) as i32)
-}
-
-fn head_height(figure: &Figure) -> u32 {
-    let lines = wrapped(&figure.subtitle, SUBTITLE).len() as u32;
-    MARGIN as u32 + 58 + lines * 38 + 16
-}
-
-fn draw_head(figure: &Figure, area: &Area<'_>) -> DrawResult {
-    let style = text_style(TITLE, BLACK, HPos::Left, VPos::Top);
-    write_text(area, &figure.title, &style, (MARGIN, MARGIN))?;
-    let style = text_style(SUBTITLE, GREY, HPos::Left, VPos::Top);
-    for (i, line) in wrapped(&figure.subtitle, SUBTITLE).iter().enumerate() {
-        write_text(area, line, &style, (MARGIN, MARGIN + 58 + 38 * i as i32))?;
+    let width = (WIDTH - 2.0 * MARGIN) / columns as f64;
+    for (i, panel) in figure.panels.iter().enumerate() {
+        let (column, row) = ((i % columns) as f64, (i / columns) as f64);
+        let corner = (MARGIN + width * column, head + panel_height * row);
+        Axes::new(panel, corner, (width, panel_height)).draw(&mut drawing);
     }
-    Ok(())
+    for (i, row) in legend.iter().enumerate() {
+        drawing.legend_row(row, below + 12.0 + ROW * (i as f64 + 0.5));
+    }
+    drawing.0 + "</svg>\n"
 }
 
-/// Breaks `text` into lines that fit into the width.
-fn wrapped(text: &str, size: f64) -> Vec<String> {
-    let room = (f64::from(WIDTH as i32 - 2 * MARGIN) / (size * CHARACTER)) as usize;
+/// Returns scales around the ranges `x` and `y` with equal lengths per unit, for a single
+/// untitled panel in its row, and the height of that panel.
+#[must_use]
+pub fn equal_scales(x: (f64, f64), y: (f64, f64)) -> (Scale, Scale, u32) {
+    let [left, right, above, below] = BESIDE;
+    let width = WIDTH - 2.0 * MARGIN - left - right;
+    let wanted = width * (y.1 - y.0) / (x.1 - x.0) + above + below;
+    let height = wanted.clamp(HEIGHTS.0, HEIGHTS.1).round();
+    let room = height - above - below;
+    let per_pixel = ((x.1 - x.0) / width).max((y.1 - y.0) / room);
+    let around = |(low, high): (f64, f64), length: f64| {
+        let middle = f64::midpoint(low, high);
+        Scale::Linear(middle - length / 2.0, middle + length / 2.0)
+    };
+    (around(x, per_pixel * width), around(y, per_pixel * room), height as u32)
+}
+
+/// Returns the estimated width of a text, pixels.
+fn text_width(text: &str, size: f64) -> f64 {
+    text.chars().count() as f64 * size * CHARACTER
+}
+
+/// Breaks a subtitle into lines that fit into the width.
+fn wrapped(text: &str) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= room => {
-                line.push(' ');
-                line.push_str(word);
+            Some(line)
+                if text_width(line, SUBTITLE) + text_width(word, SUBTITLE)
+                    < WIDTH - 2.0 * MARGIN - SUBTITLE =>
+            {
+                *line += " ";
+                *line += word;
             }
             _ => lines.push(word.to_owned()),
         }
@@ -98,92 +109,295 @@ fn wrapped(text: &str, size: f64) -> Vec<String> {
     lines
 }
 
-fn draw_panel(panel: &Panel, place: &Area<'_>, whole: &Area<'_>) -> DrawResult {
-    let inner = place.margin(if panel.title.is_empty() { 8 } else { 50 }, 8, 12, 22);
-    let mut builder = ChartBuilder::on(&inner);
-    let names = (panel.y.scale.longest_name() as f64 * TICK * CHARACTER) as i32;
-    builder.x_label_area_size(92).y_label_area_size(128.max(names + 30));
-    let mut axes = builder
-        .build_cartesian_2d(panel.x.scale.clone(), panel.y.scale.clone())
-        .map_err(message)?;
-    draw_regions(panel, &axes, whole)?;
-    draw_axes(panel, &mut axes)?;
-    draw_panel_title(panel, &axes, whole)?;
-    let (fronts, others): (Vec<&Series>, Vec<&Series>) =
-        panel.series.iter().partition(|series| series.stroke == Stroke::Front);
-    for series in fronts.into_iter().chain(others) {
-        draw_series(panel, series, &axes, whole)?;
+/// The sample beside a name in the legend.
+#[derive(Clone, Copy)]
+enum LegendSign {
+    Series(Look, Stroke),
+    Category(Look),
+    Mark,
+}
+
+/// Returns names and samples of the figure, each name once, in rows that fit into the width.
+fn legend_rows(figure: &Figure) -> Vec<Vec<(&str, LegendSign)>> {
+    let mut all: Vec<(&str, LegendSign)> = Vec::new();
+    for panel in &figure.panels {
+        let categories = panel.regions.iter().flat_map(|r| &r.categories);
+        all.extend(categories.map(|c| (c.name.as_str(), LegendSign::Category(c.look))));
+        let signs = panel.series.iter().map(|s| (s, LegendSign::Series(s.look, s.stroke)));
+        all.extend(signs.map(|(s, sign)| (s.name.as_str(), sign)));
     }
-    panel.marks.iter().try_for_each(|mark| draw_mark(panel, mark, &axes, whole))
-}
-
-fn draw_axes(panel: &Panel, axes: &mut Axes<'_, '_>) -> DrawResult {
-    let size = (WIDTH, WIDTH);
-    let mut mesh = axes.configure_mesh();
-    mesh.x_desc(panel.x.label.as_str()).y_desc(panel.y.label.as_str());
-    mesh.axis_desc_style(("sans-serif", LABEL * 1.24).into_text_style(&size));
-    mesh.label_style(("sans-serif", TICK * 1.24).into_text_style(&size));
-    mesh.axis_style(GREY.stroke_width(2));
-    if panel.regions.is_some() {
-        mesh.disable_mesh();
-    }
-    mesh.bold_line_style(GRID.stroke_width(2)).light_line_style(FAINT.stroke_width(1));
-    mesh.draw().map_err(message)
-}
-
-fn draw_panel_title(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
-    let (x, y) = axes.plotting_area().get_pixel_range();
-    let at = ((x.start + x.end) / 2, y.start - 12);
-    let style = text_style(LABEL, BLACK, HPos::Center, VPos::Bottom);
-    write_text(whole, &panel.title, &style, at)
-}
-
-/// Returns the pixels of the points within the axes.
-fn pixels(panel: &Panel, points: &[(f64, f64)], axes: &Axes<'_, '_>) -> Vec<(i32, i32)> {
-    let inside = |p: &&(f64, f64)| panel.x.scale.contains(p.0) && panel.y.scale.contains(p.1);
-    points.iter().filter(inside).map(|p| axes.backend_coord(p)).collect()
-}
-
-fn draw_series(
-    panel: &Panel,
-    series: &Series,
-    axes: &Axes<'_, '_>,
-    whole: &Area<'_>,
-) -> DrawResult {
-    let points = pixels(panel, &series.points, axes);
-    draw_stroke(&points, series.look, series.stroke, whole)
-}
-
-fn draw_mark(panel: &Panel, mark: &Mark, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
-    let Some(&at) = pixels(panel, &[mark.at], axes).first() else { return Ok(()) };
-    marker::draw_ring(whole, at, 19)?;
-    if mark.text.is_empty() {
-        return Ok(());
-    }
-    let (x, y) = axes.plotting_area().get_pixel_range();
-    let right = at.0 > (x.start + x.end) / 2;
-    let dx = if right { -26 } else { 26 };
-    let dy = if at.1 < y.start + 40 { 26 } else { -26 };
-    let side = if right { HPos::Right } else { HPos::Left };
-    let style = text_style(TICK, BLACK, side, VPos::Center);
-    write_text(whole, &mark.text, &style, (at.0 + dx, at.1 + dy))
-}
-
-/// Draws the cells, each with the marker of its category if there is room, so that the
-/// map is readable without colours.
-fn draw_regions(panel: &Panel, axes: &Axes<'_, '_>, whole: &Area<'_>) -> DrawResult {
-    let Some(regions) = &panel.regions else { return Ok(()) };
-    for (i, j, [low, high], category) in regions.filled() {
-        let corner = |p: (f64, f64)| {
-            axes.backend_coord(&(panel.x.scale.clamp(p.0), panel.y.scale.clamp(p.1)))
-        };
-        let (a, b) = (corner(low), corner(high));
-        marker::draw_box(whole, [a, b], category.look)?;
-        let (w, h) = ((b.0 - a.0).abs().max(1), (b.1 - a.1).abs().max(1));
-        let every = |side: i32| (44 / side).max(1) as usize;
-        if i % every(w) == every(w) / 2 && j % every(h) == every(h) / 2 {
-            marker::draw_small(whole, (a.0.midpoint(b.0), a.1.midpoint(b.1)), category.look)?;
+    let marks = figure.panels.iter().flat_map(|panel| &panel.marks);
+    all.extend(marks.map(|mark| (mark.name.as_str(), LegendSign::Mark)));
+    let mut rows: Vec<Vec<(&str, LegendSign)>> = Vec::new();
+    let mut left = 0.0;
+    for entry in all {
+        if entry.0.is_empty() || rows.iter().flatten().any(|(name, _)| *name == entry.0) {
+            continue;
+        }
+        left -= entry_width(entry.0);
+        match rows.last_mut() {
+            Some(row) if left >= 0.0 => row.push(entry),
+            _ => {
+                left = WIDTH - 2.0 * MARGIN - entry_width(entry.0);
+                rows.push(vec![entry]);
+            }
         }
     }
-    Ok(())
+    rows
+}
+
+fn entry_width(name: &str) -> f64 {
+    SAMPLE.iter().sum::<f64>() + text_width(name, TICK)
+}
+
+/// SVG in the making.
+struct Drawing(String);
+
+impl Drawing {
+    fn put(&mut self, element: std::fmt::Arguments<'_>) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.0, "{element}");
+    }
+
+    /// Writes text with its anchor (`start`, `middle` or `end`) on the base line at `x`, `y`.
+    fn text(&mut self, text: &str, size: f64, anchor: &str, (x, y): Pixel, colour: &str) {
+        let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+        self.put(format_args!(
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" text-anchor=\"{anchor}\" \
+             fill=\"{colour}\">{text}</text>"
+        ));
+    }
+
+    fn rectangle(&mut self, a: Pixel, b: Pixel, colour: &str) {
+        let (x, y, w, h) = (a.0.min(b.0), a.1.min(b.1), (a.0 - b.0).abs(), (a.1 - b.1).abs());
+        self.put(format_args!(
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\" fill=\"{colour}\" \
+             shape-rendering=\"crispEdges\"/>"
+        ));
+    }
+
+    fn line(&mut self, points: &[Pixel], width: f64, colour: &str, more: &str) {
+        let points: Vec<String> = points.iter().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        self.put(format_args!(
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"{more}/>",
+            points.join(" ")
+        ));
+    }
+
+    /// Draws the marker of `look` with a radius of `r` pixels.
+    fn marker(&mut self, (x, y): Pixel, look: Look, r: f64) {
+        let (path, filled) = look.marker.path();
+        let colour = look.colour();
+        let (fill, stroke) = if filled { (colour.as_str(), "none") } else { ("none", &*colour) };
+        self.put(format_args!(
+            "<path d=\"{path}\" transform=\"translate({x:.1} {y:.1}) scale({})\" fill=\"{fill}\" \
+             stroke=\"{stroke}\" stroke-width=\"{:.1}\"/>",
+            r / 10.0,
+            // 4 pixels, 3 in a small one.
+            if r < 8.0 { 30.0 / r } else { 40.0 / r },
+        ));
+    }
+
+    /// Draws line and markers through `points`, in panels and in the legend. Points less than
+    /// a pixel from the one before are left out of the line.
+    fn stroke(&mut self, points: &[Pixel], look: Look, stroke: Stroke) {
+        let mut line: Vec<Pixel> = Vec::new();
+        for (i, &(x, y)) in points.iter().enumerate() {
+            if i + 1 == points.len() || line.last().is_none_or(|b| (b.0 - x).hypot(b.1 - y) >= 1.0)
+            {
+                line.push((x, y));
+            }
+        }
+        let dash = look.dash.map(|(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
+        match stroke {
+            Stroke::Markers => {}
+            Stroke::Front => self.line(&line, 16.0, &look.colour(), " stroke-opacity=\"0.3\""),
+            _ => self.line(&line, 4.0, &look.colour(), &dash.unwrap_or_default()),
+        }
+        if matches!(stroke, Stroke::Markers | Stroke::LineAndMarkers) {
+            points.iter().for_each(|&at| self.marker(at, look, 9.0));
+        }
+    }
+
+    fn category(&mut self, a: Pixel, b: Pixel, look: Look, with_marker: bool) {
+        self.rectangle(a, b, &look.colour());
+        if with_marker {
+            self.marker((a.0.midpoint(b.0), a.1.midpoint(b.1)), look.ink(), 5.0);
+        }
+    }
+
+    fn legend_row(&mut self, row: &[(&str, LegendSign)], y: f64) {
+        let mut x = MARGIN;
+        let [width, gap, _] = SAMPLE;
+        for &(name, sign) in row {
+            let (end, middle) = (x + width, (x + width / 2.0, y));
+            match sign {
+                LegendSign::Mark => self.marker(middle, Look::BLACK, 15.0),
+                LegendSign::Category(look) => {
+                    self.category((x + 10.0, y - 15.0), (end - 10.0, y + 15.0), look, true);
+                }
+                LegendSign::Series(look, stroke) => {
+                    if stroke != Stroke::Markers {
+                        let line = if stroke == Stroke::Front { stroke } else { Stroke::Line };
+                        self.stroke(&[(x, y), (end, y)], look, line);
+                    }
+                    if matches!(stroke, Stroke::Markers | Stroke::LineAndMarkers) {
+                        self.marker(middle, look, 10.0);
+                    }
+                }
+            }
+            self.text(name, TICK, "start", (end + gap, y + 0.36 * TICK), BLACK);
+            x += entry_width(name);
+        }
+    }
+}
+
+/// A panel at its place in the drawing.
+struct Axes<'a> {
+    panel: &'a Panel,
+    /// Left end of the panel with its labels, pixels.
+    edge: f64,
+    /// The upper left and the lower right corner of the plotted area.
+    corners: [Pixel; 2],
+}
+
+impl<'a> Axes<'a> {
+    fn new(panel: &'a Panel, (x, y): Pixel, (width, height): Pixel) -> Self {
+        let [left, right, above, below] = BESIDE;
+        let names = panel.y.scale.longest_name() as f64 * TICK * CHARACTER;
+        let above = if panel.title.is_empty() { above } else { above + 42.0 };
+        let upper = (x + left.max(names + 30.0), y + above);
+        Self { panel, edge: x, corners: [upper, (x + width - right, y + height - below)] }
+    }
+
+    /// Returns the pixel of a point within the axes.
+    fn pixel(&self, (x, y): (f64, f64)) -> Option<Pixel> {
+        let inside = self.panel.x.scale.contains(x) && self.panel.y.scale.contains(y);
+        inside.then(|| (self.along(x), self.up(y)))
+    }
+
+    fn along(&self, x: f64) -> f64 {
+        let [a, b] = self.corners;
+        a.0 + self.panel.x.scale.share(x) * (b.0 - a.0)
+    }
+
+    fn up(&self, y: f64) -> f64 {
+        let [a, b] = self.corners;
+        b.1 - self.panel.y.scale.share(y) * (b.1 - a.1)
+    }
+
+    fn draw(&self, drawing: &mut Drawing) {
+        self.draw_regions(drawing);
+        if self.panel.regions.is_none() {
+            self.draw_grid(drawing);
+        }
+        self.draw_labels(drawing);
+        let (fronts, others): (Vec<&Series>, Vec<&Series>) =
+            self.panel.series.iter().partition(|series| series.stroke == Stroke::Front);
+        for series in fronts.into_iter().chain(others) {
+            let points: Vec<Pixel> = series.points.iter().filter_map(|&p| self.pixel(p)).collect();
+            drawing.stroke(&points, series.look, series.stroke);
+        }
+        self.panel.marks.iter().for_each(|mark| self.draw_mark(mark, drawing));
+    }
+
+    /// Draws lines at the ticks, those with a label darker.
+    fn draw_grid(&self, drawing: &mut Drawing) {
+        let [a, b] = self.corners;
+        let ticks =
+            [(Scale::ticks as fn(&Scale) -> Vec<f64>, "#EEEEEE"), (Scale::labelled, "#D6D6D6")];
+        for (ticks, colour) in ticks {
+            for x in ticks(&self.panel.x.scale).into_iter().map(|x| self.along(x)) {
+                drawing.line(&[(x, a.1), (x, b.1)], 2.0, colour, "");
+            }
+            for y in ticks(&self.panel.y.scale).into_iter().map(|y| self.up(y)) {
+                drawing.line(&[(a.0, y), (b.0, y)], 2.0, colour, "");
+            }
+        }
+    }
+
+    fn draw_labels(&self, drawing: &mut Drawing) {
+        let [a, b] = self.corners;
+        let middle = (a.0.midpoint(b.0), a.1.midpoint(b.1));
+        let Panel { title, x, y, .. } = self.panel;
+        drawing.line(&[a, (a.0, b.1), b], 2.0, GREY, "");
+        for value in x.scale.labelled() {
+            let at = self.along(value);
+            drawing.line(&[(at, b.1), (at, b.1 + 6.0)], 2.0, GREY, "");
+            drawing.text(&x.scale.label(value), TICK, "middle", (at, b.1 + 34.0), BLACK);
+        }
+        for value in y.scale.labelled() {
+            let at = self.up(value);
+            drawing.line(&[(a.0 - 6.0, at), (a.0, at)], 2.0, GREY, "");
+            let place = (a.0 - 10.0, at + 0.36 * TICK);
+            drawing.text(&y.scale.label(value), TICK, "end", place, BLACK);
+        }
+        drawing.text(title, LABEL, "middle", (middle.0, a.1 - 14.0), BLACK);
+        drawing.text(&x.label, LABEL, "middle", (middle.0, b.1 + 82.0), BLACK);
+        let place = (self.edge + 24.0, middle.1);
+        drawing.put(format_args!("<g transform=\"rotate(-90 {:.1} {:.1})\">", place.0, place.1));
+        drawing.text(&y.label, LABEL, "middle", place, BLACK);
+        drawing.put(format_args!("</g>"));
+    }
+
+    fn draw_mark(&self, mark: &Mark, drawing: &mut Drawing) {
+        let Some(at) = self.pixel(mark.at) else { return };
+        drawing.marker(at, Look::BLACK, 19.0);
+        let [a, b] = self.corners;
+        let right = at.0 > a.0.midpoint(b.0);
+        let (dx, anchor) = if right { (-26.0, "end") } else { (26.0, "start") };
+        let dy = if at.1 < a.1 + 40.0 { 36.0 } else { -18.0 };
+        // A white rim keeps the text readable on lines.
+        let rim = "<g stroke=\"#FFFFFF\" stroke-width=\"6\" paint-order=\"stroke\">";
+        drawing.put(format_args!("{rim}"));
+        drawing.text(&mark.text, TICK, anchor, (at.0 + dx, at.1 + dy), BLACK);
+        drawing.put(format_args!("</g>"));
+    }
+
+    /// Draws the cells, each with the marker of its category if there is room, so that the
+    /// map is readable without colours.
+    fn draw_regions(&self, drawing: &mut Drawing) {
+        let Some(regions) = &self.panel.regions else { return };
+        let corner = |p: (f64, f64)| {
+            let Panel { x, y, .. } = self.panel;
+            (self.along(x.scale.clamp(p.0)), self.up(y.scale.clamp(p.1)))
+        };
+        for (i, j, [low, high], category) in regions.filled() {
+            let (a, b) = (corner(low), corner(high));
+            let every = |side: f64| (44.0 / side.abs().max(1.0)).max(1.0) as usize;
+            let (columns, rows) = (every(b.0 - a.0), every(b.1 - a.1));
+            let with_marker = i % columns == columns / 2 && j % rows == rows / 2;
+            drawing.category(a, b, category.look, with_marker);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::Axis;
+
+    /// Draws a line from `a` to `b`; returns its length in pixels.
+    fn drawn(a: (f64, f64), b: (f64, f64), ranges: [(f64, f64); 2]) -> f64 {
+        let (x, y, panel_height) = equal_scales(ranges[0], ranges[1]);
+        let mut panel = Panel::new("", Axis::new("x", x), Axis::new("y", y));
+        panel.series.push(Series::new("line", Look::of(0), Stroke::Line, vec![a, b]));
+        let (title, subtitle) = ("t".to_owned(), "s".to_owned());
+        let drawing =
+            svg(&Figure { title, subtitle, columns: 1, panel_height, panels: vec![panel] });
+        let line = drawing.lines().find(|l| l.contains("#0072B2")).unwrap();
+        let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+        let ends: Vec<f64> =
+            points.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+        (ends[2] - ends[0]).hypot(ends[3] - ends[1])
+    }
+
+    #[test]
+    fn a_length_is_as_long_along_both_axes() {
+        for ranges in [[(-0.2, 0.2), (-0.13, 0.13)], [(-1.0, 1.0), (-9.0, 1.0)]] {
+            let along = drawn((0.0, 0.0), (0.1, 0.0), ranges);
+            let across = drawn((0.0, 0.0), (0.0, 0.1), ranges);
+            assert!((along - across).abs() <= 0.3 && along > 5.0, "{along} and {across}");
+        }
+    }
 }

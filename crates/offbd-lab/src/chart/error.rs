@@ -4,9 +4,6 @@ use std::path::PathBuf;
 /// An error of making a chart.
 #[derive(Debug, thiserror::Error)]
 pub enum ChartError {
-    /// The drawing could not be laid out; for example, a panel is too small for its labels.
-    #[error("cannot draw {figure}: {reason}")]
-    Draw { figure: String, reason: String },
     /// The drawing could not be rasterised.
     #[error("cannot rasterise the drawing: {0}")]
     Raster(String),

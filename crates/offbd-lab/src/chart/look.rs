@@ -4,8 +4,6 @@
 //! colour-blind readers can distinguish; each has its own marker and dash, so that a chart
 //! is readable without colours.
 
-use plotters::style::RGBColor;
-
 /// The marker at a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
@@ -63,15 +61,34 @@ impl Look {
         Self { rgb, ..Self::of(i) }
     }
 
-    pub(super) fn colour(self) -> RGBColor {
-        RGBColor(self.rgb.0, self.rgb.1, self.rgb.2)
+    /// Returns the colour as in `#0072B2`.
+    pub(super) fn colour(self) -> String {
+        format!("#{:02X}{:02X}{:02X}", self.rgb.0, self.rgb.1, self.rgb.2)
     }
 
     /// Returns black or white, whichever has more contrast to this colour (luma with the
     /// coefficients of ITU-R BT.709).
-    pub(super) fn ink(self) -> RGBColor {
+    pub(super) fn ink(self) -> Self {
         let (r, g, b) = (f64::from(self.rgb.0), f64::from(self.rgb.1), f64::from(self.rgb.2));
-        let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-        if luminance > 130.0 { RGBColor(0, 0, 0) } else { RGBColor(255, 255, 255) }
+        let light = 0.2126 * r + 0.7152 * g + 0.0722 * b > 130.0;
+        Self { rgb: if light { (0, 0, 0) } else { (255, 255, 255) }, ..self }
+    }
+}
+
+impl Marker {
+    /// Returns its outline as an SVG path around the origin with a radius of 10, and whether
+    /// it is filled.
+    pub(super) fn path(self) -> (&'static str, bool) {
+        const ROUND: &str = "M-10 0a10 10 0 1 0 20 0a10 10 0 1 0-20 0";
+        match self {
+            Self::Circle => (ROUND, true),
+            Self::Ring => (ROUND, false),
+            Self::Square => ("M-9-9H9V9H-9z", true),
+            Self::Triangle => ("M0-10 10 8-10 8z", true),
+            Self::Diamond => ("M0-12 9 0 0 12-9 0z", true),
+            Self::Cross => ("M-8-8 8 8M-8 8 8-8", false),
+            Self::Plus => ("M-10 0H10M0-10V10", false),
+            Self::Star => ("M0-12 3-3 12 0 3 3 0 12-3 3-12 0-3-3z", true),
+        }
     }
 }

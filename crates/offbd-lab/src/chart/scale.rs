@@ -1,9 +1,5 @@
 //! Scales of axes: range, ticks and labels; linear, logarithmic, or names.
 
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-
 /// Maximum number of labels along a logarithmic axis; chosen.
 const MOST_LABELS: usize = 7;
 
@@ -60,7 +56,7 @@ impl Scale {
     }
 
     /// Returns the position of `value` between the ends, 0 to 1.
-    fn share(&self, value: f64) -> f64 {
+    pub(super) fn share(&self, value: f64) -> f64 {
         let (low, high) = self.ends();
         match self {
             Self::Log(..) => (value / low).ln() / (high / low).ln(),
@@ -69,7 +65,7 @@ impl Scale {
     }
 
     /// Returns the values with a label.
-    fn labelled(&self) -> Vec<f64> {
+    pub(super) fn labelled(&self) -> Vec<f64> {
         match *self {
             Self::Linear(low, high) => multiples(low, high, nice_step(high - low)),
             Self::Log(low, high) => labelled_log(low, high),
@@ -78,7 +74,7 @@ impl Scale {
     }
 
     /// Returns the values with a grid line, including those with a label.
-    fn ticks(&self) -> Vec<f64> {
+    pub(super) fn ticks(&self) -> Vec<f64> {
         match *self {
             Self::Linear(..) | Self::Names(_) => self.labelled(),
             Self::Log(low, high) if high / low > 1e6 => decades(low, high, &[1.0]),
@@ -88,7 +84,7 @@ impl Scale {
         }
     }
 
-    fn label(&self, value: f64) -> String {
+    pub(super) fn label(&self, value: f64) -> String {
         match *self {
             Self::Log(low, high) if low < 0.9e-4 || high > 1.1e5 => power_of_ten(value),
             Self::Names(ref names) => names.get(value as usize).cloned().unwrap_or_default(),
@@ -160,31 +156,6 @@ fn power_of_ten(value: f64) -> String {
 fn superscript(c: char) -> char {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize])
-}
-
-impl Ranged for Scale {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let length = f64::from(limit.1 - limit.0);
-        limit.0 + (self.share(*value) * length).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() { self.ticks() } else { self.labelled() }
-    }
-
-    fn range(&self) -> Range<f64> {
-        let (low, high) = self.ends();
-        low..high
-    }
-}
-
-impl ValueFormatter<f64> for Scale {
-    fn format_ext(&self, value: &f64) -> String {
-        self.label(*value)
-    }
 }
 
 #[cfg(test)]

@@ -47,14 +47,14 @@ pub struct ChartTable {
 /// Writes records and drawings into `dir`, which is created if missing; returns the files.
 ///
 /// # Errors
-/// [`ChartError`] if a figure cannot be drawn or a file cannot be written.
+/// [`ChartError`] if a figure cannot be rasterised or a file cannot be written.
 pub fn write(chart: &Chart, dir: &Path) -> Result<Vec<PathBuf>, ChartError> {
     let failed = |source| ChartError::File { path: dir.to_owned(), source };
     std::fs::create_dir_all(dir).map_err(failed)?;
     let mut written = vec![put(dir, &format!("{}.json", chart.name), &records(chart)?)?];
     for (i, (word, figure)) in chart.figures.iter().enumerate() {
         let dash = if i == 0 { String::new() } else { format!("-{word}") };
-        let drawing = svg(figure)?;
+        let drawing = svg(figure);
         let name = |ending| format!("{}{dash}.{ending}", chart.name);
         written.push(put(dir, &name("svg"), drawing.as_bytes())?);
         written.push(put(dir, &name("png"), &png(&drawing)?)?);

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use tokio::sync::{Mutex, Notify};
+use tokio::sync::Mutex;
 
 use crate::ServiceError;
 use crate::writing::Handles;
@@ -29,18 +29,11 @@ pub(crate) struct Deleter {
     handles: Handles,
     /// Held while a part is deleted, so that two parts never share a group commit.
     lock: Arc<Mutex<()>>,
-    /// Notified after each deletion, which may leave files of cold data.
-    deleted: Arc<Notify>,
 }
 
 impl Deleter {
     pub(crate) fn new(handles: Handles) -> Self {
-        Self { handles, lock: Arc::default(), deleted: Arc::default() }
-    }
-
-    /// Notified after each deletion.
-    pub(super) fn deleted(&self) -> Arc<Notify> {
-        self.deleted.clone()
+        Self { handles, lock: Arc::default() }
     }
 
     /// Deletes all hidden data. A deletion that the store does not accept is logged and
@@ -113,7 +106,6 @@ impl Deleter {
         for part in parts(sessions) {
             self.commit_part(asset, part).await?;
         }
-        self.deleted.notify_one();
         Ok(())
     }
 

@@ -1,7 +1,6 @@
-//! Background upkeep: deletion in parts, retention, cold data, the scrub of stored data, and
-//! the watchdog of ingest.
+//! Background upkeep: deletion in parts, retention, the scrub of stored data, and the watchdog of
+//! ingest.
 
-mod cold;
 mod deletion;
 mod page_scrub;
 mod retention;
@@ -14,7 +13,6 @@ use tokio::task::JoinHandle;
 pub(super) use deletion::Deleter;
 pub(super) use watchdog::{STALLED_AFTER, Watchdog};
 
-use self::cold::ColdMover;
 use self::page_scrub::PageScrubber;
 use self::retention::Sweeper;
 use self::scrub::Scrubber;
@@ -25,7 +23,6 @@ use super::writing::Handles;
 /// The background tasks, before they are started.
 pub(super) struct Upkeep {
     sweeper: Sweeper,
-    mover: ColdMover,
     scrubber: Scrubber,
     page_scrubber: PageScrubber,
     watchdog: Watchdog,
@@ -41,14 +38,7 @@ impl Upkeep {
     ) -> Self {
         let (handles, shards) = (handles.clone(), shards.clone());
         let (deleter, retention) = (deleter.clone(), limits.retention.clone());
-        let mover = ColdMover {
-            handles: handles.clone(),
-            after: limits.cold_after,
-            every: retention.every,
-            deleted: deleter.deleted(),
-        };
         Self {
-            mover,
             sweeper: Sweeper { handles: handles.clone(), deleter, retention },
             scrubber: Scrubber { handles: handles.clone(), shards },
             page_scrubber: PageScrubber { handles },
@@ -57,10 +47,9 @@ impl Upkeep {
     }
 
     /// Starts the tasks on the current runtime.
-    pub(super) fn spawn(self) -> [JoinHandle<()>; 5] {
+    pub(super) fn spawn(self) -> [JoinHandle<()>; 4] {
         [
             tokio::spawn(self.sweeper.run()),
-            tokio::spawn(self.mover.run()),
             tokio::spawn(self.scrubber.run()),
             tokio::spawn(self.page_scrubber.run()),
             tokio::spawn(self.watchdog.run()),

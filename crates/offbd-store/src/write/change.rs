@@ -10,9 +10,9 @@ use super::statements::{
     open_session, published, put_calibration, put_fault, put_learning, put_replay, update_asset,
 };
 use crate::{
-    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, ColdWrite, CommunicationChange,
-    FaultRow, Micros, NotificationWrite, PartitionId, RemarkWrite, ReplayRow, SessionEnd,
-    SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow, snapshot, tag,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, FaultRow,
+    Micros, NotificationWrite, PartitionId, RemarkWrite, ReplayRow, SessionEnd, SessionProgress,
+    SessionRow, Snapshot, StoreError, TransitionRow, TrendRow, snapshot, tag,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -139,8 +139,6 @@ changes! {
     /// Data of a rig stay away or come back; an event.
     [event] Communication(row: CommunicationChange)
         as ("the communication of asset `{}`", row.asset) => change_communication(db, group, row);
-    /// The samples of an ended session leave the database.
-    Cold(write: ColdWrite) as ("the file of session {}", write.session()) => write.apply(db);
 }
 
 /// Changes that belong together, and the partition of their asset; `None` for changes that

@@ -6,7 +6,7 @@ use sqlx::AnyConnection;
 
 use super::group::GroupCommit;
 use crate::execute::execute;
-use crate::{Micros, StoreError, cold};
+use crate::{Micros, StoreError};
 
 impl GroupCommit<'_> {
     /// Hides the asset `name` and its sessions, deletes its faults and calibrations, and
@@ -59,7 +59,6 @@ impl GroupCommit<'_> {
         session: &str,
     ) -> Result<(), StoreError> {
         self.discard(session);
-        cold::release(db, session).await?;
         execute!(db, "DELETE FROM session WHERE id = $1"; session)
     }
 }
