@@ -208,10 +208,10 @@ fn words(name: &str) -> Vec<String> {
         if !(c.is_alphanumeric() || c == '°') || c.is_uppercase() && was_small {
             words.push(String::new());
         }
-        if c.is_alphanumeric() || c == '°' {
-            if let Some(word) = words.last_mut() {
-                word.extend(c.to_lowercase());
-            }
+        if (c.is_alphanumeric() || c == '°')
+            && let Some(word) = words.last_mut()
+        {
+            word.extend(c.to_lowercase());
         }
         was_small = c.is_lowercase();
     }

@@ -315,6 +315,9 @@ const AXES: [Axis; 2] = [
     Axis { word: "y", command: 1, position: 4, sign: -1.0 },
 ];
 
+/// A unit, and the factor by which the values change if they are in it.
+type UnitChange = (&'static str, f64);
+
 const REASON: &str = "the motion decides";
 
 impl Check<'_> {
@@ -431,12 +434,8 @@ impl Check<'_> {
 
     /// Returns the units of position and command, each with its change of the values, that explain
     /// the motion best.
-    fn candidates(
-        &self,
-        axis: &Axis,
-        ratio: f64,
-    ) -> Option<((&'static str, f64), (&'static str, f64))> {
-        let changes = |quantity: usize, usual: (f64, f64)| -> Vec<(&'static str, f64)> {
+    fn candidates(&self, axis: &Axis, ratio: f64) -> Option<(UnitChange, UnitChange)> {
+        let changes = |quantity: usize, usual: (f64, f64)| -> Vec<UnitChange> {
             let guess = self.guesses.iter().find(|guess| guess.quantity == quantity);
             let factor =
                 self.mapping.expressions[quantity].as_ref().and_then(|e| match &e.terms[..] {
@@ -453,7 +452,7 @@ impl Check<'_> {
             let found: Vec<_> = units.collect();
             if found.is_empty() { vec![("", 1.0)] } else { found }
         };
-        let error = |(position, command): &((&str, f64), (&str, f64))| {
+        let error = |(position, command): &(UnitChange, UnitChange)| {
             let explained = (ratio * position.1 / command.1).ln().abs();
             // Of two equal explanations the one that changes less.
             explained + 0.1 * f64::from(u8::from(position.1 != 1.0) + u8::from(command.1 != 1.0))

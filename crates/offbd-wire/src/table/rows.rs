@@ -83,9 +83,9 @@ pub(super) struct Rows<'a> {
     separator: u8,
     comment: Option<u8>,
     /// Number of the line read last, from 1.
-    line: u64,
+    last_line: u64,
     /// Number of the first line of the row read last.
-    first_line: u64,
+    line: u64,
     is_over: bool,
 }
 
@@ -99,12 +99,12 @@ impl<'a> Rows<'a> {
     ) -> Self {
         let source = BufReader::with_capacity(BLOCK_BYTES, source);
         let line = n_lines as u64;
-        Self { source, separator, comment, line, first_line: line, is_over: false }
+        Self { source, separator, comment, line, last_line: line, is_over: false }
     }
 
     /// The number of the line at which the row read last begins, from 1.
     pub(super) const fn line(&self) -> u64 {
-        self.first_line
+        self.line
     }
 
     /// Reads the next row that is neither blank nor a comment; false at the end.
@@ -113,7 +113,7 @@ impl<'a> Rows<'a> {
     /// The reason why the source cannot be read on; then the rows are over.
     pub(super) fn next(&mut self, cells: &mut Cells) -> io::Result<bool> {
         while !self.is_over {
-            self.first_line = self.line + 1;
+            self.line = self.last_line + 1;
             if let Err(error) = self.row(&mut cells.bytes) {
                 self.is_over = true;
                 return Err(error);
@@ -140,7 +140,7 @@ impl<'a> Rows<'a> {
                 return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
             }
             self.is_over = n == 0;
-            self.line += u64::from(n > 0);
+            self.last_line += u64::from(n > 0);
             let n_quotes = row[start..].iter().filter(|byte| **byte == b'"').count();
             is_quoted ^= n_quotes % 2 == 1;
             let is_comment =
