@@ -115,7 +115,11 @@ test("a rig is deleted after a question that says what is lost", async () => {
     .waitFor();
   assert.equal(new URL(view.url()).pathname, "/");
   assert.equal((await asks("GET", "/assets/bench-2", admin)).status, 404);
-  assert.deepEqual(errorsOf(view), []);
+  // The page may have asked for the rig at the moment at which it was deleted.
+  assert.deepEqual(
+    errorsOf(view).filter((error) => !/status of 404/.test(error)),
+    [],
+  );
   await view.done();
 });
 

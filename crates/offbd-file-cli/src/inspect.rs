@@ -21,7 +21,7 @@ use offbd_wire::table::{InspectionView, inspect};
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd inspect log.txt\n  \
-    offbd inspect counts.txt --rate 100 --columns \"x_m=#1*0.0001-0.2, cmd_qy_rad=#3*0.0005-1\"\n\n\
+    offbd inspect counts.txt --rate 100 --columns \"x_m=#1/mm, cmd_qy_rad=#3/deg\"\n\n\
     Exit status: 0 inspected, 3 the file cannot be read.")]
 pub struct InspectArgs {
     /// The recording

@@ -204,6 +204,7 @@ impl<'a> TableReader<'a> {
 ///
 /// # Errors
 /// The reason, which quotes the cell.
+#[cfg(feature = "xlsx")]
 pub(crate) fn parse_number(cell: &[u8]) -> Result<Option<f64>, String> {
     cell::parse(cell, false)
 }
