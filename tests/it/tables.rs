@@ -203,6 +203,10 @@ async fn a_dry_run_says_how_a_file_would_be_read_and_imports_nothing() {
     let refused = client.post_text("assets/a/sessions/import", "text/csv", text).await.expect(400);
     let detail = refused["detail"].as_str().unwrap();
     assert!(detail.contains("lacks the column `t_s`; it has `time`, `MV_x`"), "{detail}");
+    for (path, text) in [("dry_run=true", "[null, null]"), ("dry_run=true&rate=5e-324", HEADER)] {
+        let path = format!("assets/a/sessions/import?{path}");
+        client.post_text(&path, "text/csv", text.to_owned()).await.expect(400);
+    }
     let path = "assets/a/sessions/import?columns=x_m%3Dball%2Ffurlong";
     let refused = client.post_text(path, "text/csv", String::new()).await.expect(400);
     assert!(refused["detail"].as_str().unwrap().contains("`furlong`"), "{refused}");

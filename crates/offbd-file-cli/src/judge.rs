@@ -14,7 +14,7 @@ use offbd_core::vocabulary::Sample;
 use offbd_wire::asset;
 use offbd_wire::judging::{RecordedSession, run_name};
 use offbd_wire::session_file::{self, SessionRowError, SessionRows};
-use offbd_wire::table::{ColumnMapping, TableOptions};
+use offbd_wire::table::{ColumnMapping, RATES_HZ, TableOptions};
 
 /// How the tables of recordings in text are read.
 #[derive(Clone, Debug, Default, Args)]
@@ -29,8 +29,8 @@ pub struct TableArgs {
 }
 
 fn rate(text: &str) -> Result<f64, String> {
-    let rate = text.parse().ok().filter(|rate: &f64| *rate > 0.0 && rate.is_finite());
-    rate.ok_or_else(|| "expected a number above 0".to_owned())
+    let rate = text.parse().ok().filter(|rate| RATES_HZ.contains(rate));
+    rate.ok_or_else(|| format!("expected a number from {} to {}", RATES_HZ.start(), RATES_HZ.end()))
 }
 
 impl TableArgs {

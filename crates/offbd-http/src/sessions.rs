@@ -20,11 +20,11 @@ use super::{
     App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_time, query_word,
     session_format, time_range,
 };
-use offbd_core::vocabulary::Invalid;
+use offbd_core::vocabulary::{Invalid, in_range};
 use offbd_service::{RecordingReader, Route, Service, SessionListQuery};
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use offbd_wire::session_file::{SessionFormat, SessionWriter};
-use offbd_wire::table::{InspectionView, MappingError, TableOptions};
+use offbd_wire::table::{InspectionView, MappingError, RATES_HZ, TableOptions};
 use offbd_wire::verdict::FaultView;
 use offbd_wire::words::{SessionSort, SessionState, VerdictFilter};
 
@@ -81,7 +81,7 @@ pub(super) struct ImportQuery {
     /// default, the columns with the names of the quantities.
     columns: Option<String>,
     /// Rows a second of a text without a time.
-    #[param(exclusive_minimum = 0)]
+    #[param(minimum = 0.001, maximum = 1000000)]
     rate: Option<f64>,
     /// Whether to import nothing, and to answer what the file holds and how its columns are
     /// probably to be read.
@@ -94,8 +94,8 @@ impl ImportQuery {
         let columns = columns
             .parse()
             .map_err(|error: MappingError| Invalid::new("?columns", error.to_string()))?;
-        if self.rate.is_some_and(|rate| !(rate > 0.0 && rate.is_finite())) {
-            return Err(Invalid::new("?rate", "must be above 0").into());
+        if let Some(rate) = self.rate {
+            in_range("?rate", rate, RATES_HZ)?;
         }
         Ok(TableOptions { columns, rate_hz: self.rate })
     }

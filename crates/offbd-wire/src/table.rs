@@ -30,6 +30,10 @@ use self::dialect::Dialect;
 use self::rows::{Cells, Rows};
 use offbd_core::vocabulary::{Brief, Sample};
 
+/// The rates that a table without a time may have, rows a second. Chosen: from a row in a quarter of
+/// an hour to the fastest converters.
+pub const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=1e6;
+
 /// How a table is to be read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableOptions {
@@ -44,6 +48,8 @@ pub struct TableOptions {
 pub enum CsvError {
     #[error("no line has two or more columns, separated by commas, semicolons, tabs or blanks")]
     NoTable,
+    #[error("there are no rows below the names of the columns")]
+    NoRows,
     #[error("the table lacks the column `{name}`; it has {found}.{proposal}")]
     MissingColumn {
         name: &'static str,

@@ -103,7 +103,7 @@ pub struct InspectionView {
 /// Inspects a recording in any format that is read; `options` maps columns of a text.
 ///
 /// # Errors
-/// [`SessionFileError`] if the file cannot be read, or `options` name a column that there is not.
+/// [`SessionFileError`] if the file cannot be read or has no rows, or `options` name a column that there is not.
 pub fn inspect(
     mut source: impl Read + Seek + Send + 'static,
     options: &TableOptions,
@@ -118,6 +118,9 @@ pub fn inspect(
         return Ok(view);
     }
     let table = find_table(&mut source)?;
+    if table.dialect.first_rows.is_empty() {
+        return Err(CsvError::NoRows.into());
+    }
     layout(&mut view, &table);
     let (mut mapping, mut guesses) = guess::mapping(&table.dialect, &options.columns);
     let dialect = table.dialect.clone();
