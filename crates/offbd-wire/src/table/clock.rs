@@ -29,25 +29,23 @@ pub(super) struct RowClock {
     n_rows: u64,
     /// First and last time of the run, s.
     run: Option<(f64, f64)>,
+    /// Runs that have a valid row.
     n_runs: usize,
 }
 
 impl RowClock {
     pub(super) const fn new(is_recording: bool) -> Self {
-        Self { is_recording, last: None, step: 0.0, added: 0.0, n_rows: 0, run: None, n_runs: 1 }
+        Self { is_recording, last: None, step: 0.0, added: 0.0, n_rows: 0, run: None, n_runs: 0 }
     }
 
-    /// The number of runs so far, from 1.
-    pub(super) const fn n_runs(&self) -> usize {
-        self.n_runs
+    /// The number of the run that the rows have come to, from 1.
+    pub(super) fn n_runs(&self) -> usize {
+        self.n_runs.max(1)
     }
 
-    /// Begins another run.
+    /// Begins another run with the next valid row.
     pub(super) fn restart(&mut self) {
-        if self.run.is_some() {
-            let n_runs = self.n_runs + 1;
-            *self = Self { n_runs, ..Self::new(self.is_recording) };
-        }
+        *self = Self { n_runs: self.n_runs, ..Self::new(self.is_recording) };
     }
 
     /// Returns the time of the next row, s.
@@ -61,14 +59,13 @@ impl RowClock {
         has_decimal_commas: bool,
     ) -> Result<f64, String> {
         self.n_rows += 1;
-        let missing = |name: &str| format!("`{name}` is empty");
         let t_s = match source {
             TimeSource::Rows(period_s) => (self.n_rows - 1) as f64 * period_s,
             TimeSource::Columns(columns) => {
                 let value = columns.value(cells, has_decimal_commas)?;
-                self.unwrapped(value.ok_or_else(|| missing("t_s"))?, columns.factor())
+                self.unwrapped(value.ok_or_else(|| "`t_s` is empty".to_owned())?, columns.factor())
             }
-            TimeSource::Moments { columns, name } => moments(cells, columns, name)?,
+            TimeSource::Moments(columns) => moments(cells, columns)?,
         };
         Ok(t_s)
     }
@@ -97,25 +94,26 @@ impl RowClock {
         if !self.is_recording {
             return;
         }
-        match &mut self.run {
-            Some((first, last)) if t_s < *last - RESTART_S && t_s < *first + RESTART_S => {
+        let goes_on =
+            |(first, last): &(f64, f64)| t_s >= *last - RESTART_S || t_s >= *first + RESTART_S;
+        match self.run.as_mut().filter(|run| goes_on(run)) {
+            Some((_, last)) => *last = last.max(t_s),
+            None => {
                 self.run = Some((t_s, t_s));
                 self.n_runs += 1;
             }
-            Some((_, last)) => *last = last.max(t_s),
-            None => self.run = Some((t_s, t_s)),
         }
     }
 }
 
-fn moments(cells: &Cells, columns: &[usize], name: &str) -> Result<f64, String> {
+fn moments(cells: &Cells, columns: &[usize]) -> Result<f64, String> {
     let mut sum = 0.0;
     for column in columns {
-        let bytes = cells.get(*column).ok_or_else(|| format!("no field `{name}`"))?;
+        let bytes = cells.get(*column).ok_or_else(|| "no field `t_s`".to_owned())?;
         let text =
-            std::str::from_utf8(cell::bare(bytes)).map_err(|_| format!("`{name}`: not UTF-8"))?;
+            std::str::from_utf8(cell::bare(bytes)).map_err(|_| "`t_s`: not UTF-8".to_owned())?;
         sum += cell::moment(text)
-            .ok_or_else(|| format!("`{name}`: `{text}` is not a date or a time of day"))?;
+            .ok_or_else(|| format!("`t_s`: `{text}` is not a date or a time of day"))?;
     }
     Ok(sum)
 }

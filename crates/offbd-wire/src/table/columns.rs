@@ -7,8 +7,20 @@ use super::rows::Cells;
 use super::{CsvError, TableOptions, guess};
 use crate::session_csv::COLUMNS;
 
-/// The columns of each axis: its command and its position.
-const AXES: [[usize; 2]; 2] = [[2, 3], [1, 4]];
+/// The quantities of an axis, as indices in [`COLUMNS`].
+pub(super) struct Axis {
+    pub(super) word: &'static str,
+    pub(super) command: usize,
+    pub(super) position: usize,
+    /// The sign of the acceleration for a positive command: +qy moves the ball toward +x, +qx
+    /// toward -y.
+    pub(super) sign: f64,
+}
+
+pub(super) const AXES: [Axis; 2] = [
+    Axis { word: "x", command: 2, position: 3, sign: 1.0 },
+    Axis { word: "y", command: 1, position: 4, sign: -1.0 },
+];
 
 /// A column with its factor, or a constant.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,8 +33,8 @@ struct BoundTerm {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BoundColumns {
     terms: Vec<BoundTerm>,
-    /// What an error names.
-    name: String,
+    /// The quantity, which an error names.
+    name: &'static str,
 }
 
 impl BoundColumns {
@@ -69,7 +81,7 @@ pub(super) enum TimeSource {
     /// A sum of columns; with one column alone its factor, which a counter that wraps needs.
     Columns(BoundColumns),
     /// Dates and times of day, which are added.
-    Moments { columns: Vec<usize>, name: String },
+    Moments(Vec<usize>),
     /// The number of the row times this, s.
     Rows(f64),
 }
@@ -135,15 +147,15 @@ impl BoundMapping {
         if !is_mapped(0) && options.rate_hz.is_none() {
             return Err(missing(0));
         }
-        for axis in AXES {
+        for axis in &AXES {
             if let [Some(absent), None] | [None, Some(absent)] =
-                axis.map(|quantity| (!is_mapped(quantity)).then_some(quantity))
+                [axis.command, axis.position].map(|q| (!is_mapped(q)).then_some(q))
             {
                 return Err(missing(absent));
             }
         }
-        if AXES.iter().all(|axis| !is_mapped(axis[0])) {
-            return Err(missing(AXES[1][0]));
+        if AXES.iter().all(|axis| !is_mapped(axis.command)) {
+            return Err(missing(AXES[1].command));
         }
         let time = match (time, options.rate_hz) {
             (Some(columns), _) => time_source(dialect, columns),
@@ -187,7 +199,7 @@ fn bind(
         Ok(BoundTerm { column, factor: *factor })
     };
     let terms = expression.terms.iter().map(bound).collect::<Result<Vec<_>, CsvError>>()?;
-    Ok(BoundColumns { terms, name: quantity.to_owned() })
+    Ok(BoundColumns { terms, name: quantity })
 }
 
 /// The time is a date if the first rows have dates where numbers would be.
@@ -201,7 +213,7 @@ fn time_source(dialect: &Dialect, columns: BoundColumns) -> TimeSource {
         })
     };
     match indices.filter(is_moment) {
-        Some(indices) => TimeSource::Moments { columns: indices, name: columns.name },
+        Some(indices) => TimeSource::Moments(indices),
         None => TimeSource::Columns(columns),
     }
 }

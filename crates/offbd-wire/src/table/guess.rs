@@ -25,7 +25,7 @@ const LARGEST_M: f64 = 2.0;
 const LARGEST_RAD: f64 = 1.6;
 
 /// Returns a column's name as an error shows it.
-pub(super) fn shown(dialect: &Dialect, column: usize) -> String {
+fn shown(dialect: &Dialect, column: usize) -> String {
     match dialect.names.get(column) {
         Some(name) if name.chars().count() > LONGEST_NAME => {
             format!("`{}…`", name.chars().take(LONGEST_NAME).collect::<String>())
@@ -62,7 +62,7 @@ pub(crate) fn nearest_of<'a>(
     let likeness = |word: &&str| {
         (1000.0 * strsim::jaro_winkler(&wanted.to_lowercase(), &word.to_lowercase())) as u64
     };
-    // The usual threshold of the measure for a typing error.
+    // Chosen: `x` and `t_s` are less alike, `cmd_qx` and `cmd_qx_rad` more.
     words.max_by_key(likeness).filter(|word| likeness(word) >= 800)
 }
 

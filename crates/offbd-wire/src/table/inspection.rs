@@ -5,7 +5,8 @@ use std::io::{Read, Seek};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::expression::{ColumnMapping, Dimension, UNITS};
+use super::columns::{AXES, Axis};
+use super::expression::{ColumnMapping, Dimension};
 use super::guess::{self, Guess};
 use super::motion::{self, ASKED_M_S2, Motion};
 use super::{CsvError, OpenedTable, TableOptions, TableReader, find_table};
@@ -103,7 +104,8 @@ pub struct InspectionView {
 /// Inspects a recording in any format that is read; `options` maps columns of a text.
 ///
 /// # Errors
-/// [`SessionFileError`] if the file cannot be read or has no rows, or `options` name a column that there is not.
+/// [`SessionFileError`] if the file cannot be read or has no rows, or `options` name a
+/// column that the file does not have.
 pub fn inspect(
     mut source: impl Read + Seek + Send + 'static,
     options: &TableOptions,
@@ -304,20 +306,6 @@ struct Check<'a> {
     largest: [f64; COLUMNS.len()],
 }
 
-/// The quantities of an axis, and the sign of the acceleration for a positive command: +qy moves
-/// the ball toward +x, +qx toward -y.
-struct Axis {
-    word: &'static str,
-    command: usize,
-    position: usize,
-    sign: f64,
-}
-
-const AXES: [Axis; 2] = [
-    Axis { word: "x", command: 2, position: 3, sign: 1.0 },
-    Axis { word: "y", command: 1, position: 4, sign: -1.0 },
-];
-
 /// A unit, and the factor by which the values change if they are in it.
 type UnitChange = (&'static str, f64);
 
@@ -416,7 +404,8 @@ impl Check<'_> {
                 (Some(guess), Some(expression)) => {
                     for term in &mut expression.terms {
                         // By the word, so that the mapping shows it.
-                        let si = UNITS.iter().find(|(unit, _)| *unit == word).map_or(1.0, |u| u.1);
+                        let mut units = Dimension::of(quantity).units().iter();
+                        let si = units.find(|(unit, _)| *unit == word).map_or(1.0, |u| u.1);
                         term.factor = si.copysign(term.factor);
                     }
                     guess.unit = word;

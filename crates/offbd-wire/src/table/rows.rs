@@ -77,6 +77,29 @@ impl From<&str> for Cells {
     }
 }
 
+/// Whether a quotation mark is open, as in CSV (RFC 4180, section 2): one that begins a cell opens
+/// it, two within it are a character, and one within a cell that has not begun so is a character.
+#[derive(Default)]
+struct Quotes {
+    is_open: bool,
+    /// Whether the byte before has closed it.
+    is_closed: bool,
+    /// Whether the byte before is within a cell.
+    is_within: bool,
+}
+
+impl Quotes {
+    fn read(&mut self, bytes: &[u8], separator: u8) {
+        for byte in bytes {
+            let is_quote = *byte == b'"';
+            let opens = is_quote && (self.is_closed || !self.is_within);
+            self.is_closed = self.is_open && is_quote;
+            self.is_open = if self.is_open { !is_quote } else { opens };
+            self.is_within = *byte != separator;
+        }
+    }
+}
+
 /// Reads rows.
 pub(super) struct Rows<'a> {
     source: BufReader<Box<dyn Read + Send + 'a>>,
@@ -130,7 +153,7 @@ impl<'a> Rows<'a> {
     /// Reads a line, and those after it if a quotation mark is not closed.
     fn row(&mut self, row: &mut Vec<u8>) -> io::Result<()> {
         row.clear();
-        let mut is_quoted = false;
+        let mut quotes = Quotes::default();
         loop {
             let start = row.len();
             let room = (MAX_ROW_BYTES + 1).saturating_sub(start);
@@ -141,11 +164,10 @@ impl<'a> Rows<'a> {
             }
             self.is_over = n == 0;
             self.last_line += u64::from(n > 0);
-            let n_quotes = row[start..].iter().filter(|byte| **byte == b'"').count();
-            is_quoted ^= n_quotes % 2 == 1;
+            quotes.read(&row[start..], self.separator);
             let is_comment =
                 || self.comment.is_some() && cell::bare(row).first().copied() == self.comment;
-            if self.is_over || !is_quoted || is_comment() {
+            if self.is_over || !quotes.is_open || is_comment() {
                 break;
             }
         }

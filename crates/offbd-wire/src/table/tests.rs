@@ -214,3 +214,21 @@ fn a_file_with_other_names_is_refused_with_a_mapping() {
     let error = recorded("a\nb\n", "", None).unwrap_err();
     assert!(error.contains("no line has two or more columns"), "{error}");
 }
+
+#[test]
+fn a_quotation_mark_within_a_cell_is_a_character() {
+    let head = "t_s,cmd_qy_rad,x_m,note\n";
+    let row = |t: &str, note: &str| format!("{t},0,0,{note}\n");
+    let notes = ["5\" ball", "\"a, b\"", "\"two\nlines\"", "\"say \"\"so\"\"\"", "it's", "6\" 7"];
+    let rows: String = notes.iter().enumerate().map(|(i, n)| row(&i.to_string(), n)).collect();
+    let expected: Vec<(usize, f64)> = (0..notes.len()).map(|i| (1, i as f64)).collect();
+    assert_eq!(times(&format!("{head}{rows}"), "", None), expected);
+}
+
+#[test]
+fn a_header_without_rows_is_not_a_run() {
+    let head = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n";
+    let text = format!("{head}{head}0,0,0,0,0\n1,0,0,0,0\n{head}");
+    let mut reader = TableReader::recording(text.as_bytes(), &TableOptions::default()).unwrap();
+    assert_eq!((reader.by_ref().count(), reader.n_runs()), (2, 1));
+}
