@@ -281,7 +281,7 @@ impl Broker<'_> {
         }
     }
 
-    /// Returns the asset of a message and what it is, or what becomes of it.
+    /// Returns the asset of a message and its content, or the outcome of one that is left out.
     fn address(&self, publish: &Publish) -> Result<(String, BusMessage), MessageOutcome> {
         let topic = publish.topic.as_str();
         if let Some((entry, asset)) = self.settings.mapping.find(topic) {

@@ -43,7 +43,7 @@ enum Start {
     Later,
     /// A series for each combination of the labels, with this value.
     At(f64, &'static [Label]),
-    /// One series, which is read on each scrape; none while there is no value.
+    /// One series, read on each scrape; absent while it has no value.
     Read(fn(&App) -> Option<f64>),
 }
 
@@ -97,7 +97,7 @@ metrics! {
     "offbd_commits_overtaken_total" Counter ZERO
         => "Write sets refused because their partition moved";
     "offbd_commits_total" Counter ZERO => "Successful commits";
-    "offbd_communication_lost" Gauge ZERO => "Rigs with an open session whose data stay away";
+    "offbd_communication_lost" Gauge ZERO => "Rigs with an open session that have stopped sending";
     "offbd_connections" Gauge Later => "Open connections";
     "offbd_connections_refused_total" Counter ZERO => "Connections refused at the limit";
     "offbd_deliveries_given_up_total" Counter At(0.0, &[CHANNEL])

@@ -15,7 +15,7 @@ use super::{Location, MIGRATIONS, StoreError};
 /// pages have checksums, its contents are checked, and it is on the disk on return.
 ///
 /// # Errors
-/// [`StoreError`] if there is no such database, `copy` exists, or it cannot be written.
+/// [`StoreError`] if the database does not exist, `copy` exists, or it cannot be written.
 pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError> {
     let file = location.file().ok_or(StoreError::NotSqlite)?;
     check_absent(copy)?;

@@ -27,7 +27,7 @@ const KEEPALIVES: &str = "SET tcp_keepalives_idle = 3; SET tcp_keepalives_interv
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WriterRole {
     /// Everything, for all partitions. At most one writer of a database has this role, and
-    /// there is no node beside it.
+    /// it is the only node.
     Main,
     /// Everything, for the partitions that it takes: a node of a cluster (PostgreSQL).
     Node,

@@ -34,7 +34,8 @@ impl Service {
     /// Waits until few enough other files are read, then reads it on a blocking thread. The
     /// asset's open session is ended when the file has been opened; from then until the import
     /// is complete, live telemetry of the asset is refused with [`ServiceError::Busy`]. An import
-    /// that fails, or whose caller is dropped, leaves neither a session nor faults; one that a
+    /// that fails, or whose caller is dropped, leaves neither a session nor faults, but for faults
+    /// of earlier runs of the file, which have ended; one that a
     /// stop interrupts is discarded, at the latest at the next start.
     ///
     /// # Errors

@@ -136,7 +136,7 @@ changes! {
     Alarm(write: AlarmWrite) as ("a change of mutes or notes") => write.apply(db);
     Notification(write: NotificationWrite) as ("a change of notifications") => write.apply(db);
     Remark(write: RemarkWrite) as ("a remark on session {}", write.session()) => write.apply(db);
-    /// Data of a rig stay away or come back; an event.
+    /// A rig stops or resumes sending; published as an event.
     [event] Communication(row: CommunicationChange)
         as ("the communication of asset `{}`", row.asset) => change_communication(db, group, row);
 }

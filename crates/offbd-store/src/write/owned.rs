@@ -67,7 +67,7 @@ impl OwnedPartitions {
         }
     }
 
-    /// Checks that the database is no older copy of what the node `me` has seen.
+    /// Checks that the database is not an older copy of the one that the node `me` has seen.
     ///
     /// # Errors
     /// [`StoreError::UnexpectedCommits`] if it is.
