@@ -162,7 +162,8 @@ impl Service {
     /// if the asset is not loaded.
     ///
     /// # Errors
-    /// Those of [`Shards::look`](crate::asset::Shards::look).
+    /// [`ServiceError::Busy`], [`ServiceError::Moving`] or [`ServiceError::Unavailable`] if the
+    /// shard of the asset does not answer.
     pub async fn watch(
         &self,
         name: &str,
