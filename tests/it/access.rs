@@ -552,7 +552,7 @@ async fn a_request_above_the_rate_limit_gets_429_with_retry_after() {
     let other = service.caller("w", Role::Viewer, None).await;
     // At once: on a busy machine, a rate is not reached by one request after the other.
     let refused = async |client: &Client| {
-        let answers = join_all((0..200).map(|_| client.get("assets"))).await;
+        let answers = join_all((0..1000).map(|_| client.get("assets"))).await;
         answers.into_iter().find(|answer| answer.status == 429).expect("one is refused")
     };
     let answer = refused(&viewer).await;

@@ -5,6 +5,8 @@ use serde_json::{Value, json};
 
 use crate::cli::fixture::CliFixture;
 use crate::support::ServiceFixture;
+#[cfg(feature = "xlsx")]
+use crate::support::workbook::{SHEET, workbook};
 
 /// A file as its owner has it.
 struct OddFile {
@@ -64,7 +66,8 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
     let utf16 = table(&HEADER.replace(',', "\t"), rows, "\t", plain);
     let utf16 =
         [0xfeff].into_iter().chain(utf16.encode_utf16()).flat_map(u16::to_le_bytes).collect();
-    vec![
+    #[cfg_attr(not(feature = "xlsx"), expect(unused_mut))]
+    let mut files = vec![
         file("plain", table(HEADER, rows, ",", plain), ""),
         file("spreadsheet", table(&semicolons, rows, ";", commas), ""),
         file(
@@ -102,7 +105,32 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             table("", rows, ",", plain),
             "t_s=#1, cmd_qx_rad=#2, cmd_qy_rad=#3, x_m=#4, y_m=#5",
         ),
-    ]
+    ];
+    #[cfg(feature = "xlsx")]
+    {
+        let columns = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y";
+        files.push(OddFile { name: "workbook", bytes: spreadsheet(rows), columns, rate: None });
+    }
+    files
+}
+
+/// A workbook with a title, other names and a line of units; a cell without a value is absent.
+#[cfg(feature = "xlsx")]
+fn spreadsheet(rows: &[[Option<f64>; 5]]) -> Vec<u8> {
+    let text = |text: &str| format!(r#"<c t="inlineStr"><is><t>{text}</t></is></c>"#);
+    let texts = |words: [&str; 5]| format!("<row>{}</row>", words.map(text).concat());
+    let mut sheet = format!("<row r=\"1\">{}</row>", text("Rig 3"));
+    sheet += &texts(["Zeit", "Roll", "Pitch", "X", "Y"]);
+    sheet += &texts(["s", "rad", "rad", "m", "m"]);
+    for (i, row) in rows.iter().enumerate() {
+        let cell = |(column, value): (char, &Option<f64>)| {
+            value.map(|value| format!(r#"<c r="{column}{}"><v>{value}</v></c>"#, i + 4))
+        };
+        let cells: String = ('A'..='E').zip(row).filter_map(cell).collect();
+        sheet += &format!("<row r=\"{}\">{cells}</row>", i + 4);
+    }
+    let sheet = format!("<worksheet><sheetData>{sheet}</sheetData></worksheet>");
+    workbook(&[(SHEET, sheet.as_bytes())])
 }
 
 /// The verdict of `offbd replay`.
@@ -135,8 +163,9 @@ async fn a_recording_in_any_layout_is_judged_the_same_through_every_door() {
         // Of another asset, as an asset remembers the faults of its earlier sessions.
         client.asset(&format!("a{i}")).await;
         let path = format!("assets/a{i}/sessions/import?name=s&columns={}", encoded(file.columns));
-        let request =
-            client.request(reqwest::Method::POST, &path).header("content-type", "text/csv");
+        let request = client
+            .request(reqwest::Method::POST, &path)
+            .header("content-type", "application/octet-stream");
         let imported = client.send(request.body(file.bytes.clone())).await.expect(201);
         assert_eq!(imported["rejected"], 0, "{}", file.name);
         let hash = &imported["session"]["verdict"]["verdict_hash"];

@@ -38,24 +38,25 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
     view.evaluate(
       ([name, text]) => {
         const files = new DataTransfer();
-        files.items.add(new File([text], name, { type: "text/csv" }));
+        const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+        files.items.add(new File([bytes], name, { type: "text/csv" }));
         dispatchEvent(new DragEvent("drop", { dataTransfer: files, bubbles: true, cancelable: true }));
       },
       [name, text],
     );
   await drop("letter.csv", "Dear all,\nno recording.\nYours\n");
-  await view.getByRole("alert").getByText("No line has three or more columns").waitFor();
+  await view.getByText("Choose the column of the time, or give the rows per second").waitFor();
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
   await drop("picture.csv", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR,\x02,\x01\n1,2,3\n4,5,6\n");
-  await view.getByRole("alert").getByText("This file is neither a text nor").waitFor();
+  await view.getByRole("alert").getByText("this is a picture, not a recording").waitFor();
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
 
-  // Times that are dates: nothing can be imported, and no rig is registered.
-  await drop("dates.csv", "t_s,x_m,y_m\n2026-03-01T10:00:00.020,0,0\n2026-03-01T10:00:00.040,0,0\n");
+  // Nothing says which column is what: nothing can be imported, and no rig is registered.
+  await drop("numbers.csv", "0,1,2\n0.01,1,2\n0.02,1,2\n");
   await view.getByRole("dialog").getByLabel("Rig").fill("stranger");
-  await view.getByText("The column of the time has no numbers").waitFor();
+  await view.getByText("Choose the column of the time, or give the rows per second").waitFor();
   assert.ok(await view.getByRole("button", { name: /^Import 0 rows/ }).isDisabled());
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
@@ -65,24 +66,50 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
   await dialogue.getByText("There is no rig new-rig yet").waitFor();
   await dialogue.getByRole("button", { name: /^Import/ }).click();
   await view.getByRole("heading", { name: "dropped" }).waitFor();
-  assert.deepEqual(view.errors, []);
+  // The picture, which the service refuses.
+  assert.deepEqual(
+    view.errors.filter((error) => !/status of 400/.test(error)),
+    [],
+  );
   await view.done();
 });
 
-test("a time in milliseconds under the name of seconds is found by the rate of the rig", async () => {
-  const [head, ...lines] = rig.healthy.trim().split("\n");
-  const rows = lines.map((line) => line.replace(/^[\d.]+/, (t) => String(Math.round(Number(t) * 1000))));
+test("a recording as its owner has it is read by its guesses, once they are confirmed", async () => {
+  const [head, ...lines] = rig.sick.trim().split("\n");
+  assert.equal(head, "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m");
+  const decimal = (value) => (value === "" ? "" : `${value}`.replace(".", ","));
+  const row = (line) => {
+    const [t, qx, qy, x, y] = line.split(",");
+    const degrees = (rad) => (rad === "" ? "" : (Number(rad) * 180) / Math.PI);
+    const centimetres = (m) => (m === "" ? "NA" : Number(m) * 100);
+    const cells = [Math.round(Number(t) * 1000), degrees(qx), degrees(qy), centimetres(x), centimetres(y)];
+    return cells.map(decimal).join(";");
+  };
+  const text = ["Prüfstand 3", "Zeit;Roll;Pitch;Ball X;Ball Y", ...lines.map(row)].join("\r\n");
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions`);
-  const buffer = Buffer.from([head, ...rows].join("\n"));
-  await view.locator("input[type=file]").setInputFiles({ name: "ms.csv", mimeType: "text/csv", buffer });
+  const buffer = Buffer.from(text, "latin1");
+  await view.locator("input[type=file]").setInputFiles({ name: "lab.csv", mimeType: "text/csv", buffer });
   const dialogue = view.getByRole("dialog");
-  await dialogue
-    .getByText(/A row comes every 10.* but the rig sends 100 per second: is the time in ms\?/)
-    .waitFor();
-  await dialogue.getByRole("button", { name: "Time is in ms" }).click();
-  await dialogue.getByText("90.0\u202fs: 100.0\u202fHz").waitFor();
-  assert.equal(await dialogue.getByText("is the time in").count(), 0);
+  await dialogue.getByText("Windows-1252, separated by semicolons; decimal commas").waitFor();
+  const chosen = (label) => dialogue.getByLabel(label, { exact: true }).inputValue();
+  assert.equal(await chosen("Unit of Time"), "ms");
+  assert.equal(await chosen("Unit of Ball x"), "cm");
+  assert.equal(await chosen("Unit of Command qx (about x)"), "deg");
+  // A wrong unit is doubted, and corrected with one click.
+  await dialogue.getByLabel("Unit of Ball y").selectOption("mm");
+  const correct = dialogue.getByRole("button", { name: "Take y_m = 'Ball Y'/cm" });
+  await correct.click();
+  await correct.waitFor({ state: "detached" });
+  assert.equal(await chosen("Unit of Ball y"), "cm");
+  await dialogue.getByLabel("Rig").fill("bench");
+  await dialogue.getByRole("button", { name: /^Import [\d\s]+ rows/ }).click();
+  await view.getByRole("heading", { name: "lab" }).waitFor();
+  const { items } = await ask(service.url, "GET", "/sessions?asset=bench&name=lab");
+  const verdict = items[0].verdict;
+  await ask(service.url, "POST", "/assets/bench/sessions/import?name=own", rig.sick, "text/csv");
+  const own = (await ask(service.url, "GET", "/sessions?asset=bench&name=own")).items[0].verdict;
+  assert.deepEqual(verdict.faults, own.faults);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -10,7 +10,9 @@ use crate::judge::TableArgs;
 use offbd_terminal::errors::InputError;
 use offbd_terminal::output::{self, OutputFormat};
 use offbd_terminal::table;
-use offbd_wire::table::{InspectionView, inspect};
+use offbd_wire::table::{
+    InspectedQuantityView, InspectionRemarkView, InspectionView, MappingChangeView, inspect,
+};
 
 /// Shows what a recording holds, and proposes how to read its columns.
 ///
@@ -58,12 +60,12 @@ fn write_text(
     writeln!(out, "{}", table::wrapped("", &format))?;
     write_columns(out, view)?;
     write_rows(out, view)?;
-    for guess in &view.guessed {
-        let line = format!("{} is probably {}: {}", guess.quantity, guess.expression, guess.reason);
-        writeln!(out, "{}", table::wrapped("  ", &line))?;
-    }
-    for remark in &view.remarks {
-        writeln!(out, "{}", table::wrapped("  ", &format!("note: {remark}")))?;
+    write_quantities(out, view)?;
+    for InspectionRemarkView { text, changes } in &view.remarks {
+        writeln!(out, "{}", table::wrapped("note: ", text))?;
+        for MappingChangeView { quantity, expression } in changes {
+            writeln!(out, "      {quantity}={expression}")?;
+        }
     }
     if view.mapping.is_empty() && view.rows == 0 {
         let example = "--columns \"t_s=#1/ms, cmd_qy_rad=#2/deg, x_m=#3*0.0001-0.2\"";
@@ -104,6 +106,22 @@ fn write_columns(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<
     }
     writeln!(out)?;
     for line in table::lines(&columns) {
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+fn write_quantities(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<()> {
+    let heading = ["quantity", "column", "from", "to", "guessed by"];
+    let mut quantities = table::table_of_files(&heading, &[2, 3]);
+    let value = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
+    for InspectedQuantityView { quantity, expression, reason, from, to } in &view.quantities {
+        let expression = expression.clone().unwrap_or_else(|| "-".to_owned());
+        let reason = reason.clone().unwrap_or_default();
+        quantities.add_row([quantity.clone(), expression, value(*from), value(*to), reason]);
+    }
+    writeln!(out)?;
+    for line in table::lines(&quantities) {
         writeln!(out, "{line}")?;
     }
     Ok(())

@@ -76,15 +76,15 @@ pub(super) struct SessionsQuery {
 pub(super) struct ImportQuery {
     /// Name of the session; the time of the import by default.
     name: Option<String>,
-    /// Which columns of a text are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
+    /// Which columns of a text or a sheet are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
     /// columns and constants for each, with `*NUMBER`, `/NUMBER` or `/UNIT` behind a column. By
-    /// default, the columns with the names of the quantities.
+    /// default, the columns with the names of the quantities; `QUANTITY=none` leaves one out.
     columns: Option<String>,
     /// Rows a second of a text without a time.
     #[param(minimum = 0.001, maximum = 1000000)]
     rate: Option<f64>,
     /// Whether to import nothing, and to answer what the file holds and how its columns are
-    /// probably to be read.
+    /// probably to be read. The asset need not exist.
     dry_run: Option<bool>,
 }
 
@@ -147,7 +147,7 @@ pub(super) async fn open(
 /// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the first sheet
 /// of an Excel workbook, in which a time may be a date. A text may have any usual encoding,
 /// separator and decimal sign, comments and lines before the table; other names, units and a
-/// missing time are given by `columns` and `rate`. If its clock starts again, each run becomes a
+/// missing time of a text or a sheet are given by `columns` and `rate`. If its clock starts again, each run becomes a
 /// session. Its samples are processed like live
 /// telemetry. The asset's open session is ended first, and the new session is ended after
 /// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
@@ -176,12 +176,15 @@ pub(super) async fn import(
 ) -> Result<Response, Problem> {
     let format = session_format::of_file(&headers)?;
     let options = query.options()?;
-    app.service.check_known(&asset).await?;
+    let is_dry_run = query.dry_run == Some(true);
+    if !is_dry_run {
+        app.service.check_known(&asset).await?;
+    }
     let limits = &app.service.limits().requests;
     let timeout = limits.body_timeout() * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;
     let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
-    if query.dry_run == Some(true) {
+    if is_dry_run {
         return Ok(Json(app.service.inspect(file, options).await?).into_response());
     }
     let imported = app.service.import(&asset, query.name, file, format, options, limit).await?;

@@ -23,15 +23,13 @@ mod mcap_scene;
 mod parquet;
 #[cfg(feature = "parquet")]
 mod parquet_pages;
-#[cfg(feature = "xlsx")]
-mod sheet_rows;
 #[cfg(feature = "parquet")]
 mod trace_columns;
 mod trace_writer;
 #[cfg(feature = "xlsx")]
 mod workbook_check;
 #[cfg(feature = "xlsx")]
-mod xlsx;
+pub(crate) mod xlsx;
 
 pub use trace_writer::TraceWriter;
 
@@ -153,7 +151,55 @@ impl fmt::Display for SessionFormat {
 const ARROW_FILE: &[u8] = b"ARROW1\0\0";
 
 /// Bytes that show the format of a file.
-pub(crate) const HEAD_BYTES: u64 = 8;
+pub(crate) const HEAD_BYTES: u64 = 128;
+
+/// What files begin with that are not recordings, what they are, and what to do with them.
+const FOREIGN: [(&[u8], &str, &str); 9] = [
+    (b"\xd0\xcf\x11\xe0", "an old Excel workbook", AS_XLSX),
+    (b"MATLAB 5.0 MAT-file", "a MATLAB file", AS_CSV),
+    (b"\x89HDF\r\n", "an HDF5 or MATLAB file", AS_CSV),
+    (b"\x1f\x8b", "a gzip file", "unpack it first"),
+    (b"7z\xbc\xaf", "a 7-Zip file", "unpack it first"),
+    (b"SQLite format 3\0", "an SQLite database", "restore it with `offbd restore`, or export CSV"),
+    (b"\x89PNG\r\n", "a picture", AS_RECORDING),
+    (b"\xff\xd8\xff", "a picture", AS_RECORDING),
+    (b"%PDF-", "a PDF document", AS_RECORDING),
+];
+
+/// What an OpenDocument file has within its first bytes.
+const OPEN_DOCUMENT: &[u8] = b"mimetypeapplication/vnd.oasis.opendocument";
+
+const AS_XLSX: &str = "save it as .xlsx or as CSV in the spreadsheet program";
+const AS_CSV: &str = "write it as CSV, with the columns t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m";
+const AS_BATCHES: &str =
+    "send it in batches (`POST /api/v1/assets/NAME/telemetry`), or write it as CSV";
+const AS_RECORDING: &str = "a recording is a table of times, commands and positions";
+
+/// Checks that a file that begins with `head` is not one of another program.
+///
+/// # Errors
+/// [`SessionFileError::Foreign`].
+pub(crate) fn check_own(head: &[u8]) -> Result<(), SessionFileError> {
+    let open_document = || {
+        let is_here = head.windows(OPEN_DOCUMENT.len()).any(|bytes| bytes == OPEN_DOCUMENT);
+        is_here.then_some(("an OpenDocument file", AS_XLSX))
+    };
+    let json = || {
+        let mut bytes = head.iter().filter(|byte| !byte.is_ascii_whitespace());
+        // A column may be named `[s]`.
+        let is_json = match bytes.next() {
+            Some(b'{') => true,
+            Some(b'[') => bytes.next().is_some_and(|byte| b"{[\"".contains(byte)),
+            _ => false,
+        };
+        is_json.then_some(("a JSON document", AS_BATCHES))
+    };
+    let found = FOREIGN.iter().find(|(signature, ..)| head.starts_with(signature));
+    match found.map(|(_, what, advice)| (*what, *advice)).or_else(open_document).or_else(json) {
+        Some((what, advice)) => Err(SessionFileError::Foreign { what, advice }),
+        None => Ok(()),
+    }
+}
 
 /// Why a file cannot be read or written as a session.
 #[derive(Debug, thiserror::Error)]
@@ -164,6 +210,9 @@ pub enum SessionFileError {
         "this build of offbd has no {format}; build it with `cargo build --features {feature}`"
     )]
     NotBuilt { format: SessionFormat, feature: &'static str },
+    /// A file of another program.
+    #[error("this is {what}, not a recording; {advice}")]
+    Foreign { what: &'static str, advice: &'static str },
     #[error("{0} files are only written, not read")]
     NotRead(SessionFormat),
     #[error("{0} files are only read, not written")]
@@ -258,7 +307,7 @@ pub trait SessionRows: Iterator<Item = Result<Sample, SessionRowError>> + Send {
 }
 
 /// Opens the session file `source`. Without `format` its first bytes say what it is. `options` say
-/// how a text is read; the columns of other formats have the names of the quantities.
+/// how a text and a sheet are read; the columns of other formats have the names of the quantities.
 ///
 /// # Errors
 /// [`SessionFileError`] if this build does not read the format, a column is missing or has
@@ -271,6 +320,7 @@ pub fn open<S: Read + Seek + Send + 'static>(
     let mut head = Vec::new();
     if format.is_none() {
         source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+        check_own(&head)?;
     }
     let format = format.unwrap_or_else(|| SessionFormat::of(&head));
     if format == SessionFormat::Csv {
@@ -287,7 +337,7 @@ pub fn open<S: Read + Seek + Send + 'static>(
         #[cfg(feature = "mcap")]
         SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source)?)),
         #[cfg(feature = "xlsx")]
-        SessionFormat::Xlsx => Ok(Box::new(xlsx::rows(source)?)),
+        SessionFormat::Xlsx => Ok(Box::new(xlsx::SheetRows::new(xlsx::sheet(source)?, options)?)),
         _ => {
             format.check()?;
             Err(SessionFileError::NotRead(format))
@@ -448,6 +498,37 @@ impl SessionWriter {
             Encoding::Arrow(encoder) => encoder.end(),
             #[cfg(feature = "mcap")]
             Encoding::Mcap(encoder) => encoder.end(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_other_programs_are_named() {
+        let open_document =
+            [&b"PK\x03\x04\x14"[..], &[0; 25], OPEN_DOCUMENT, b".spreadsheet"].concat();
+        for (head, what) in [
+            (
+                &b"\xd0\xcf\x11\xe0\xa1\xb1"[..],
+                "an old Excel workbook, not a recording; save it as",
+            ),
+            (&open_document, "an OpenDocument file"),
+            (b"\x89HDF\r\n\x1a\n", "an HDF5 or MATLAB file, not a recording; write it as CSV"),
+            (b"MATLAB 5.0 MAT-file, Platform", "a MATLAB file"),
+            (b"\x1f\x8b\x08", "a gzip file, not a recording; unpack it first"),
+            (b"\n [{\"t_s\": 0}]", "a JSON document, not a recording; send it in batches"),
+            (b"\x89PNG\r\n\x1a\n", "a picture"),
+        ] {
+            let error = check_own(head).unwrap_err().to_string();
+            assert!(error.starts_with(&format!("this is {what}")), "{error}");
+        }
+        for own in
+            [&b"t_s,x_m\n"[..], b"", b"PK\x03\x04", b"PAR1", b"\x89MCAP0\r\n", b"\xff\xfet\0"]
+        {
+            assert!(check_own(own).is_ok(), "{own:?}");
         }
     }
 }

@@ -22,7 +22,10 @@ use std::io::{self, Cursor, Read};
 
 pub use self::expression::{ColumnMapping, ColumnName, Expression, MappingError, Term};
 pub(crate) use self::guess::nearest_of;
-pub use self::inspection::{ColumnView, GuessView, InspectionView, inspect};
+pub use self::inspection::{
+    InspectedColumnView, InspectedMotionView, InspectedQuantityView, InspectionRemarkView,
+    InspectionView, MappingChangeView, inspect,
+};
 
 use self::clock::RowClock;
 use self::columns::BoundMapping;
@@ -204,15 +207,6 @@ impl<'a> TableReader<'a> {
             && self.cells.len() == names.len()
             && names.iter().enumerate().all(is_name)
     }
-}
-
-/// Parses the number in a cell; `None` if it is missing.
-///
-/// # Errors
-/// The reason, which quotes the cell.
-#[cfg(feature = "xlsx")]
-pub(crate) fn parse_number(cell: &[u8]) -> Result<Option<f64>, String> {
-    cell::parse(cell, false)
 }
 
 impl Iterator for TableReader<'_> {

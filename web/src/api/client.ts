@@ -15,6 +15,7 @@ import type {
   FaultFilter,
   FaultLine,
   FaultRecording,
+  FileInspection,
   FleetEntry,
   HistoryEntry,
   ImportResult,
@@ -36,6 +37,19 @@ import type {
   Trends,
   Trial,
 } from "./types";
+
+/** Sends a recording to be imported; its first bytes tell the format. */
+const sendFile = <T>(
+  asset: string,
+  file: File,
+  values: Record<string, string | number | boolean | undefined>,
+) =>
+  request<T>(`${BASE}/assets/${segment(asset)}/sessions/import${query(values)}`, {
+    method: "POST",
+    body: file,
+    headers: { "content-type": "application/octet-stream" },
+    signal: AbortSignal.timeout(900_000),
+  });
 
 export const api = {
   health: () => request<ServiceHealth>("/healthz"),
@@ -95,13 +109,11 @@ export const api = {
     send<Remark>("POST", `/sessions/${segment(session)}/remarks${query({ by: actor() })}`, remark),
   removeRemark: (session: string, id: string) =>
     send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
-  importRecording: (asset: string, name: string, file: string | File, format: FormatName) =>
-    request<ImportResult>(`${BASE}/assets/${segment(asset)}/sessions/import${query({ name })}`, {
-      method: "POST",
-      body: file,
-      headers: { "content-type": FORMATS[format].mediaType },
-      signal: AbortSignal.timeout(900_000),
-    }),
+  /** Reads a file without importing it. */
+  inspectRecording: (file: File, reading: { columns?: string; rate?: number }) =>
+    sendFile<FileInspection>("any", file, { ...reading, dry_run: true }),
+  importRecording: (asset: string, name: string, file: File, reading: { columns?: string; rate?: number }) =>
+    sendFile<ImportResult>(asset, file, { ...reading, name }),
   replay: (session: string, settings: ReplaySettings) =>
     send<Replay>("POST", `/sessions/${segment(session)}/replays`, settings),
   replayState: (replay: string) => get<Replay>(`/replays/${segment(replay)}`),

@@ -1,22 +1,20 @@
-//! Sessions in spreadsheets (Excel's `.xlsx`): the first sheet, whose first row with cells is
-//! the header of the CSV file.
+//! Sessions in spreadsheets (Excel's `.xlsx`): the first sheet, as the text that the spreadsheet
+//! program would save it as, so that it is read as a text is (`table.rs`).
 //!
-//! A number may be a number or its text. A time may be a date, which counts from 1970 in UTC, or
-//! a time of day, which counts from midnight. The library reads a sheet only as long as it
-//! borrows the workbook, so all rows are read at once; how much that may be is checked before
-//! (`workbook_check.rs`).
+//! A number may be a number or its text, a time a date or a time of day. The library reads a sheet
+//! only as long as it borrows the workbook, so the text is in memory; how much the workbook may
+//! take is checked before (`workbook_check.rs`).
 
-use std::io::{Read, Seek};
-use std::vec;
+use std::io::{Cursor, Read, Seek};
 
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
+use jiff::Timestamp;
 
-use super::sheet_rows::{SheetRow, SheetRows};
 use super::workbook_check;
 use super::{
     RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
 };
-use crate::table::parse_number;
+use crate::table::{RowError, TableOptions, TableReader};
 use offbd_core::vocabulary::Sample;
 
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.
@@ -24,109 +22,189 @@ const EPOCH_DAYS: [f64; 2] = [25_569.0, 24_107.0];
 
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
+/// Most rows of a sheet: all that a spreadsheet has. A sheet with more is refused.
+const MAX_ROWS: u32 = 1 << 20;
+
+/// Longest text of a sheet, bytes. Chosen: a million rows of six numbers with all their digits.
+const MAX_SHEET_BYTES: usize = 128 << 20;
+
+/// Characters of a cell that are read. Chosen: names and numbers are shorter, and many cells may
+/// name one long text.
+const LONGEST_CELL: usize = 200;
+
 pub(super) fn damaged(reason: impl ToString) -> SessionFileError {
     SessionFileError::Damaged { format: SessionFormat::Xlsx, reason: reason.to_string() }
 }
 
-/// The value of a cell; text is borrowed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum CellValue<'a> {
-    Empty,
-    Number(f64),
-    /// Seconds since 1970 in UTC, or since midnight.
-    Time(f64),
-    Text(&'a str),
-    /// Anything else, by what it is.
-    Other(&'static str),
+fn wrong(sheet: &str, reason: impl ToString) -> SessionFileError {
+    SessionFileError::Sheet { sheet: sheet.to_owned(), reason: reason.to_string() }
 }
 
-impl<'a> CellValue<'a> {
-    fn of(cell: &'a DataRef<'a>, is_1904: bool) -> Self {
-        match cell {
-            DataRef::Empty => Self::Empty,
-            DataRef::Int(value) => Self::Number(*value as f64),
-            DataRef::Float(value) => Self::Number(*value),
-            DataRef::String(text) => Self::Text(text),
-            DataRef::SharedString(text) => Self::Text(text),
-            DataRef::DateTime(date) => Self::Time(seconds(*date, is_1904)),
-            DataRef::DateTimeIso(_) | DataRef::DurationIso(_) => Self::Other("a date as text"),
-            DataRef::Bool(_) => Self::Other("a truth value"),
-            DataRef::Error(_) => Self::Other("an error"),
-        }
-    }
-
-    /// The value as a quantity, or as a time if `is_time`; `None` if the cell is empty.
-    pub(super) fn number(self, is_time: bool) -> Result<Option<f64>, String> {
-        match self {
-            Self::Empty => Ok(None),
-            Self::Number(value) if value.is_finite() => Ok(Some(value)),
-            Self::Number(value) => Err(format!("`{value}` is not finite")),
-            Self::Time(value) if is_time && value.is_finite() => Ok(Some(value)),
-            Self::Time(_) => Err("a date is not a number".to_owned()),
-            Self::Text(text) => parse_number(text.as_bytes()),
-            Self::Other(what) => Err(format!("{what} is not a number")),
-        }
+/// Returns the text of a cell.
+fn cell_text(cell: &DataRef<'_>, is_1904: bool) -> String {
+    match cell {
+        DataRef::Empty => String::new(),
+        DataRef::Int(value) => value.to_string(),
+        DataRef::Float(value) => value.to_string(),
+        DataRef::String(text) => line_of(text),
+        DataRef::SharedString(text) => line_of(text),
+        DataRef::DateTime(date) => moment(*date, is_1904),
+        DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => text.clone(),
+        DataRef::Bool(value) => value.to_string(),
+        DataRef::Error(error) => error.to_string(),
     }
 }
 
-/// The seconds of a date, to the microsecond that the fraction of a day resolves.
-fn seconds(date: ExcelDateTime, is_1904: bool) -> f64 {
+/// Returns a text as one line, as a row is one; of a long text the beginning and a sign of that.
+fn line_of(text: &str) -> String {
+    let mut chars = text.chars();
+    let line = chars.by_ref().take(LONGEST_CELL).map(|c| if c.is_control() { ' ' } else { c });
+    let mut line: String = line.collect();
+    line.extend(chars.next().map(|_| '…'));
+    line
+}
+
+/// Returns a date or a time of day, to the microsecond that the fraction of a day resolves; seconds
+/// for a duration of days.
+fn moment(date: ExcelDateTime, is_1904: bool) -> String {
     let days = date.as_f64();
     let has_day = !date.is_duration() && days >= 1.0;
     let epoch = if has_day { EPOCH_DAYS[usize::from(is_1904)] } else { 0.0 };
-    ((days - epoch) * SECONDS_PER_DAY * 1e6).round() / 1e6
+    let micros = ((days - epoch) * SECONDS_PER_DAY * 1e6).round();
+    let text = Timestamp::from_microsecond(micros as i64).map(|moment| moment.to_string());
+    match text {
+        Ok(text) if has_day => text,
+        Ok(text) if (0.0..1.0).contains(&days) => {
+            text.trim_start_matches("1970-01-01T").trim_end_matches('Z').to_owned()
+        }
+        _ => (micros / 1e6).to_string(),
+    }
 }
 
-/// Opens a workbook and reads its first sheet.
-pub(super) fn rows<S: Read + Seek>(mut source: S) -> Result<XlsxRows, SessionFileError> {
+/// A sheet as a text.
+pub(crate) struct Sheet {
+    pub(crate) name: String,
+    pub(crate) text: Vec<u8>,
+}
+
+/// Opens a workbook and returns its first sheet.
+///
+/// # Errors
+/// [`SessionFileError`] if the workbook is damaged or too large.
+pub(crate) fn sheet<S: Read + Seek>(mut source: S) -> Result<Sheet, SessionFileError> {
     guarded(SessionFormat::Xlsx, || {
         workbook_check::check(&mut source)?;
         source.rewind()?;
         let mut workbook = Xlsx::new(source).map_err(damaged)?;
-        let sheet = workbook.sheet_names().into_iter().next();
-        let sheet = sheet.ok_or_else(|| damaged("it has no sheet"))?;
-        let rows = read(&mut workbook, &sheet)?.into_iter();
-        Ok(XlsxRows { sheet, rows, row: 0 })
+        let name = workbook.sheet_names().into_iter().next();
+        let name = name.ok_or_else(|| damaged("it has no sheet"))?;
+        let text = text(&mut workbook, &name)?;
+        Ok(Sheet { name, text })
     })?
 }
 
-fn read<S: Read + Seek>(
-    workbook: &mut Xlsx<S>,
-    sheet: &str,
-) -> Result<Vec<SheetRow>, SessionFileError> {
+fn text<S: Read + Seek>(workbook: &mut Xlsx<S>, sheet: &str) -> Result<Vec<u8>, SessionFileError> {
     let is_1904 = workbook.has_1904_epoch();
     let mut cells = workbook.worksheet_cells_reader(sheet).map_err(damaged)?;
-    let mut rows = SheetRows::new(sheet);
+    let mut lines = Lines { sheet, ..Lines::default() };
     while let Some(cell) = cells.next_cell().map_err(damaged)? {
-        rows.cell(cell.get_position(), CellValue::of(cell.get_value(), is_1904))?;
+        let value = cell_text(cell.get_value(), is_1904);
+        if !value.is_empty() {
+            lines.cell(cell.get_position(), &value)?;
+        }
     }
-    rows.end()
+    lines.end_row()?;
+    Ok(lines.text)
+}
+
+/// The lines of a sheet, as its cells come row by row.
+#[derive(Default)]
+struct Lines<'a> {
+    sheet: &'a str,
+    text: Vec<u8>,
+    /// The row and the cells of the line that is being gathered, both counted from 0.
+    row: u32,
+    cells: Vec<String>,
+    /// Cells of the widest line so far. A sheet has no cells at the end of a row that lacks
+    /// values; the line has them.
+    width: usize,
+}
+
+impl Lines<'_> {
+    fn cell(&mut self, (row, column): (u32, u32), value: &str) -> Result<(), SessionFileError> {
+        if row >= MAX_ROWS {
+            return Err(wrong(self.sheet, format!("it has more than {MAX_ROWS} rows")));
+        }
+        while self.row < row {
+            self.end_row()?;
+            self.row += 1;
+        }
+        let column = column as usize;
+        if self.cells.len() <= column {
+            self.cells.resize(column + 1, String::new());
+        }
+        self.cells[column].push_str(value);
+        Ok(())
+    }
+
+    /// Writes the line; an empty one for a row without cells, so that lines count rows.
+    fn end_row(&mut self) -> Result<(), SessionFileError> {
+        if !self.cells.is_empty() {
+            self.width = self.width.max(self.cells.len());
+            self.cells.resize(self.width, String::new());
+            let mut line = csv::WriterBuilder::new().from_writer(&mut self.text);
+            line.write_record(&self.cells).map_err(damaged)?;
+            line.flush()?;
+            self.cells.clear();
+        } else {
+            self.text.push(b'\n');
+        }
+        if self.text.len() > MAX_SHEET_BYTES {
+            let limit = MAX_SHEET_BYTES as u64;
+            return Err(SessionFileError::Expands { what: "the first sheet", limit });
+        }
+        Ok(())
+    }
 }
 
 /// The rows of the first sheet.
-pub(super) struct XlsxRows {
+pub(super) struct SheetRows {
     sheet: String,
-    rows: vec::IntoIter<SheetRow>,
-    /// The number of the row read last, as the spreadsheet shows it.
-    row: u64,
+    rows: TableReader<'static>,
 }
 
-impl Iterator for XlsxRows {
-    type Item = Result<Sample, SessionRowError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let row = self.rows.next()?;
-        self.row = row.number();
-        let place = self.place();
-        Some(row.sample().map_err(|reason| {
-            let reason = format!("sheet `{}`, {reason}", self.sheet);
-            SessionRowError::Rejected(RejectedRow { place, reason })
-        }))
+impl SheetRows {
+    /// Reads a sheet by `options`.
+    ///
+    /// # Errors
+    /// [`SessionFileError::Sheet`] if a column is missing.
+    pub(super) fn new(sheet: Sheet, options: &TableOptions) -> Result<Self, SessionFileError> {
+        let Sheet { name, text } = sheet;
+        match TableReader::recording(Cursor::new(text), options) {
+            Ok(rows) => Ok(Self { sheet: name, rows }),
+            Err(error) => Err(wrong(&name, error)),
+        }
     }
 }
 
-impl SessionRows for XlsxRows {
+impl Iterator for SheetRows {
+    type Item = Result<Sample, SessionRowError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rejected = |RowError { line, reason }| {
+            let reason = format!("sheet `{}`, {reason}", self.sheet);
+            SessionRowError::Rejected(RejectedRow { place: RowPlace::Row(line), reason })
+        };
+        self.rows.next().map(|row| row.map_err(rejected))
+    }
+}
+
+impl SessionRows for SheetRows {
     fn place(&self) -> RowPlace {
-        RowPlace::Row(self.row)
+        RowPlace::Row(self.rows.line())
+    }
+
+    fn n_runs(&self) -> usize {
+        self.rows.n_runs()
     }
 }

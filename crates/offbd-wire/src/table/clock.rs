@@ -112,8 +112,12 @@ fn moments(cells: &Cells, columns: &[usize]) -> Result<f64, String> {
         let bytes = cells.get(*column).ok_or_else(|| "no field `t_s`".to_owned())?;
         let text =
             std::str::from_utf8(cell::bare(bytes)).map_err(|_| "`t_s`: not UTF-8".to_owned())?;
-        sum += cell::moment(text)
-            .ok_or_else(|| format!("`t_s`: `{text}` is not a date or a time of day"))?;
+        // A spreadsheet has dates and numbers of seconds in one column.
+        let seconds = cell::moment(text).or_else(|| cell::number(text));
+        sum += seconds.ok_or_else(|| match text {
+            "" => "`t_s` is empty".to_owned(),
+            _ => format!("`t_s`: `{text}` is not a date or a time of day"),
+        })?;
     }
     Ok(sum)
 }

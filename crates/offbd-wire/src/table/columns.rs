@@ -139,12 +139,14 @@ impl BoundMapping {
         };
         let bound = |quantity: usize| -> Result<Option<BoundColumns>, CsvError> {
             let expression = mapping.expressions[quantity].as_ref();
+            let expression = expression.filter(|e| !e.terms.is_empty());
             expression.map(|e| bind(dialect, COLUMNS[quantity], e)).transpose()
         };
         let time = bound(0)?;
         let quantities = [bound(1)?, bound(2)?, bound(3)?, bound(4)?];
+        // A quantity that is left out is not missing.
         let is_mapped = |quantity: usize| mapping.expressions[quantity].is_some();
-        if !is_mapped(0) && options.rate_hz.is_none() {
+        if time.is_none() && options.rate_hz.is_none() {
             return Err(missing(0));
         }
         for axis in &AXES {
@@ -156,6 +158,9 @@ impl BoundMapping {
         }
         if AXES.iter().all(|axis| !is_mapped(axis.command)) {
             return Err(missing(AXES[1].command));
+        }
+        if quantities.iter().all(Option::is_none) {
+            return Err(missing(AXES[0].position));
         }
         let time = match (time, options.rate_hz) {
             (Some(columns), _) => time_source(dialect, columns),

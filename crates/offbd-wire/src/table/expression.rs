@@ -7,7 +7,8 @@
 //! A mapping is a list of `QUANTITY=EXPRESSION`. An expression is a sum of columns and constants,
 //! each with any number of factors: `*NUMBER`, `/NUMBER` or `/UNIT`. A column is written by its
 //! name, in quotes if the name has blanks or one of `+-*/,='"`, or by its number: `#1` is the
-//! first. The time may be a date, or a date and a time of day: `t_s=date+clock`.
+//! first. The time may be a date, or a date and a time of day: `t_s=date+clock`. `y_m=none` leaves
+//! a quantity out.
 
 use std::fmt;
 
@@ -67,7 +68,10 @@ pub struct Term {
     pub factor: f64,
 }
 
-/// A sum of columns and constants.
+/// What leaves a quantity out.
+const NONE: &str = "none";
+
+/// A sum of columns and constants; without terms, the quantity is left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Expression {
     pub terms: Vec<Term>,
@@ -90,15 +94,8 @@ impl ColumnMapping {
     /// Returns the mapping with names instead of the numbers of columns that have one.
     #[must_use]
     pub(super) fn with_names(&self, names: &[String]) -> Self {
-        let mut named = self.clone();
-        for term in named.expressions.iter_mut().flatten().flat_map(|e| &mut e.terms) {
-            if let Some(ColumnName::Number(n)) = &term.column
-                && let Some(name) = names.get(n - 1).filter(|name| !name.is_empty())
-            {
-                term.column = Some(ColumnName::Name(name.clone()));
-            }
-        }
-        named
+        let named = |e: &Option<Expression>| e.as_ref().map(|e| e.with_names(names));
+        Self { expressions: self.expressions.each_ref().map(named) }
     }
 }
 
@@ -137,8 +134,37 @@ impl fmt::Display for ColumnMapping {
 }
 
 impl Expression {
+    /// Returns the expression with names instead of the numbers of columns that have one.
+    #[must_use]
+    pub(super) fn with_names(&self, names: &[String]) -> Self {
+        let mut named = self.clone();
+        for term in &mut named.terms {
+            if let Some(ColumnName::Number(n)) = &term.column
+                && let Some(name) = names.get(n - 1).filter(|name| !name.is_empty())
+            {
+                term.column = Some(ColumnName::Name(name.clone()));
+            }
+        }
+        named
+    }
+
+    /// Returns the expression of the quantity with this index in [`COLUMNS`] as it is parsed.
+    #[must_use]
+    pub(super) fn text(&self, quantity: usize) -> String {
+        struct Written<'a>(&'a Expression, Dimension);
+        impl fmt::Display for Written<'_> {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.write(f, self.1)
+            }
+        }
+        Written(self, Dimension::of(quantity)).to_string()
+    }
+
     /// Writes the expression of a quantity of `dimension` as it is parsed.
     fn write(&self, f: &mut fmt::Formatter<'_>, dimension: Dimension) -> fmt::Result {
+        if self.terms.is_empty() {
+            return f.write_str(NONE);
+        }
         for (i, Term { column, factor }) in self.terms.iter().enumerate() {
             let plus = if i > 0 { "+" } else { "" };
             f.write_str(if factor.is_sign_negative() { "-" } else { plus })?;
@@ -230,6 +256,12 @@ impl<'a> Parser<'a> {
         quantity: &str,
     ) -> Result<Expression, MappingError> {
         let mut terms = Vec::new();
+        if let Some(rest) = self.rest.trim_start().strip_prefix(NONE).map(str::trim_start)
+            && (rest.is_empty() || rest.starts_with(','))
+        {
+            self.rest = rest;
+            return Ok(Expression::default());
+        }
         loop {
             self.rest = self.rest.trim_start();
             let is_negative = match self.rest.chars().next() {
@@ -385,6 +417,11 @@ mod tests {
         assert_eq!(x.as_ref().unwrap().terms, [column("ball_x_px", 0.000235), constant]);
         let third = Term { column: Some(ColumnName::Number(3)), factor: 1e-3 * 2.0 };
         assert_eq!(y.as_ref().unwrap().terms, [column("ball y [cm]", 1e-2), third]);
+        let mapping = parse("cmd_qx_rad=none , x_m=none/mm, y_m= none").unwrap();
+        let [_, qx, _, x, y] = &mapping.expressions;
+        assert_eq!((qx, y), (&Some(Expression::default()), &Some(Expression::default())));
+        assert_eq!(x.as_ref().unwrap().terms, [column("none", 1e-3)]);
+        assert_eq!(mapping.to_string(), "cmd_qx_rad=none, x_m=none/mm, y_m=none");
     }
 
     #[test]

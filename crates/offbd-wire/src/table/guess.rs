@@ -83,7 +83,7 @@ fn time_column(dialect: &Dialect) -> Option<usize> {
 }
 
 fn by_step(step: f64) -> String {
-    format!("guessed from a step of {} from row to row", Brief(step))
+    format!("a step of {} from row to row", Brief(step))
 }
 
 /// Returns `value` with three significant digits.
@@ -277,7 +277,8 @@ impl Guess {
     }
 }
 
-fn name(dialect: &Dialect, column: usize) -> ColumnName {
+/// Returns the name of a column, or its number.
+pub(super) fn name(dialect: &Dialect, column: usize) -> ColumnName {
     match dialect.names.get(column) {
         Some(name) if !name.is_empty() => ColumnName::Name(name.clone()),
         _ => ColumnName::Number(column + 1),
@@ -366,7 +367,7 @@ fn unit(
     }
     let all = alike.iter().flat_map(|column| values(dialect, *column));
     let largest = all.fold(0.0, |most: f64, value| most.max(value.abs()));
-    let by_size = |unit| (unit, format!("guessed from values up to {largest}"));
+    let by_size = |unit| (unit, format!("values up to {}", Brief(rounded(largest))));
     match dimension {
         Dimension::Time => {
             let is_date = dialect.first_rows.first().and_then(|row| row.get(column));

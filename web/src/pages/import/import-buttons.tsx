@@ -1,48 +1,41 @@
+import type { FileInspection } from "../../api/types";
 import { ActionButton } from "../../parts/action-button";
 import { count } from "../../words/numbers";
-import type { Mapping } from "./mapping";
-import { QUANTITIES, QUANTITY_TITLES, type Quantity } from "./quantities";
-
-/** The required quantities; a recording without commands can be imported. */
-const REQUIRED: Quantity[] = ["t_s", "x_m", "y_m"];
 
 interface Props {
-  mapping: Mapping;
-  /** Number of rows with a time. */
-  nRows: number;
-  /** Number of rows with a time and a position. */
-  nSeen: number;
+  inspection: FileInspection;
+  /** Why the file cannot be read by the mapping. */
+  problem?: string;
+  isBusy: boolean;
+  /** Whether the time comes from the rate of the rows, which is not given. */
+  lacksRate: boolean;
   hasAsset: boolean;
   send: () => Promise<void>;
   cancel: () => void;
 }
 
 /** Why the recording cannot be imported yet; empty if it can. */
-function obstacle({ mapping, nRows, nSeen, hasAsset }: Omit<Props, "send" | "cancel">): string {
-  const missing = REQUIRED.filter((quantity) => mapping[quantity].index === null);
-  if (missing.length)
-    return `Choose the column of: ${missing.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}.`;
-  if (nRows < 2) return "The column of the time has no numbers: a time is a number of seconds, ms or µs.";
-  if (nSeen < 2) return "No row has both coordinates of the ball as numbers.";
+function obstacle({ inspection, problem, lacksRate, hasAsset }: Props): string {
+  if (problem) return problem;
+  if (lacksRate) return "Choose the column of the time, or give the rows per second.";
+  if (inspection.rows < 2) return "No two rows can be read: choose the columns.";
+  if (inspection.without_ball === 1) return "No row has a position of the ball.";
   return hasAsset ? "" : "Choose the rig.";
 }
 
-export function ImportButtons({ send, cancel, ...recording }: Props) {
-  const { mapping, nRows } = recording;
-  const problem = obstacle(recording);
-  const absent = QUANTITIES.filter((quantity) => mapping[quantity].index === null);
+export function ImportButtons(props: Props) {
+  const { inspection, isBusy, send, cancel } = props;
+  const problem = obstacle(props);
   return (
     <div class="form-end">
       <span class={problem ? "late" : "quiet"} role="status">
-        {problem ||
-          (absent.length > 0 &&
-            `Not assigned: ${absent.map((quantity) => QUANTITY_TITLES[quantity]).join(", ")}`)}
+        {isBusy ? "Reading the file…" : problem}
       </span>
       <button type="button" onClick={cancel}>
         Cancel
       </button>
-      <ActionButton class="primary" action={send} disabled={problem !== ""} needs="operator">
-        Import {count(nRows)} rows
+      <ActionButton class="primary" action={send} disabled={isBusy || problem !== ""} needs="operator">
+        Import {count(inspection.rows)} rows
       </ActionButton>
     </div>
   );

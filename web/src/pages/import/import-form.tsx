@@ -1,52 +1,59 @@
-import { useMemo } from "preact/hooks";
 import { api } from "../../api/client";
+import type { FileInspection } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
-import { ColumnMapping } from "./column-mapping";
-import { countSeen, finite, toColumns, toCsv } from "./columns";
+import { FileColumns } from "./file-columns";
+import { FileRemarks } from "./file-remarks";
 import { ImportButtons } from "./import-buttons";
 import { ImportTarget } from "./import-target";
-import type { Mapping } from "./mapping";
+import { columnsParameter, LEFT_OUT, mappingOf } from "./mapping";
+import { MappingTable } from "./mapping-table";
+import { MappingText } from "./mapping-text";
 import { Preview } from "./preview";
-import { SanityCheck } from "./sanity-check";
+import { RateField } from "./rate-field";
 import { useImport, type ImportProps } from "./use-import";
-import type { RecordingFile } from "./use-recording-file";
+import type { Inspecting } from "./use-inspection";
 
 interface Props extends ImportProps {
-  recording: RecordingFile;
-  setMapping: (mapping: Mapping) => void;
+  file: File;
+  inspection: FileInspection;
+  inspecting: Inspecting;
 }
 
-/** Samples per second of a rig that is not described yet. */
-const DEFAULT_RATE_HZ = 100;
-
 /** The samples per second of the chosen rig. */
-function useRate(name: string, known: string[]): number {
+function useRate(name: string, known: string[]): number | undefined {
   const isKnown = known.includes(name);
   const { data } = useQuery(
     () => (isKnown ? api.asset(name) : Promise.resolve(undefined)),
     `${name} ${isKnown}`,
   );
-  return data?.sample_rate_hz ?? DEFAULT_RATE_HZ;
+  return data?.sample_rate_hz;
 }
 
-/** Imports a table whose columns are assigned here. */
-export function ImportForm({ recording, setMapping, ...props }: Props) {
-  const { table, mapping } = recording;
-  const columns = useMemo(() => toColumns(table, mapping), [table, mapping]);
+/** Imports a file whose columns are assigned here. */
+export function ImportForm({ file, inspection, inspecting, ...props }: Props) {
+  const { problem, isBusy, reading, change, setColumns, setRate } = inspecting;
+  const { rate } = reading;
   const { target, send } = useImport(props);
-  const rate = useRate(target.asset, target.assets);
+  const rigRate = useRate(target.asset, target.assets);
+  const mapping = mappingOf(inspection);
+  const isText = inspection.columns.length > 0;
+  const hasTime = mapping.t_s !== "" && mapping.t_s !== LEFT_OUT;
   return (
     <>
       <ImportTarget {...target} />
-      <ColumnMapping table={table} mapping={mapping} change={setMapping} />
-      <Preview columns={columns} />
-      <SanityCheck rate={rate} columns={columns} mapping={mapping} change={setMapping} />
+      {isText && <MappingTable inspection={inspection} change={change} />}
+      {isText && !hasTime && <RateField rate={rate} setRate={setRate} />}
+      {isText && <MappingText mapping={reading.columns ?? columnsParameter(mapping)} change={setColumns} />}
+      {isText && <FileColumns columns={inspection.columns} isOpen={inspection.rows === 0} />}
+      {inspection.rows > 0 && <Preview inspection={inspection} />}
+      <FileRemarks inspection={inspection} rate={rigRate} change={change} />
       <ImportButtons
-        mapping={mapping}
-        nRows={finite(columns.t_s).length}
-        nSeen={countSeen(columns)}
+        inspection={inspection}
+        problem={problem}
+        isBusy={isBusy}
+        lacksRate={!hasTime && rate === undefined}
         hasAsset={target.asset !== ""}
-        send={() => send(toCsv(columns), "csv")}
+        send={() => send(file, isText ? { columns: columnsParameter(mapping), rate } : {})}
         cancel={props.cancel}
       />
     </>

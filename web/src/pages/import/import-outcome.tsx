@@ -1,4 +1,3 @@
-import type { FormatName } from "../../api/formats";
 import type { ImportResult } from "../../api/types";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
@@ -7,12 +6,8 @@ import { count } from "../../words/numbers";
 /** Number of listed rejections. */
 const SHOWN = 8;
 
-/** The formats in which a row with the names of the columns is before the first sample. */
-const NAMED: FormatName[] = ["csv", "xlsx"];
-
 /** The result of an import of which not all rows were accepted, or that made several sessions. */
-export function ImportOutcome({ result, format }: { result: ImportResult; format: FormatName }) {
-  const firstRow = NAMED.includes(format) ? 2 : 1;
+export function ImportOutcome({ result }: { result: ImportResult }) {
   const { accepted, rejected, late, duplicate, rejections, session, more_sessions = [] } = result;
   return (
     <div>
@@ -31,7 +26,7 @@ export function ImportOutcome({ result, format }: { result: ImportResult; format
         <ul class="plain quiet">
           {rejections.slice(0, SHOWN).map(({ index, reason }) => (
             <li>
-              row {index + firstRow}: {reason}
+              row {index + 1}: {reason}
             </li>
           ))}
           {rejected > SHOWN && <li>and {count(rejected - SHOWN)} more</li>}

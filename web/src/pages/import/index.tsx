@@ -5,8 +5,7 @@ import { Dialog } from "../../parts/dialog";
 import { count } from "../../words/numbers";
 import { ImportForm } from "./import-form";
 import { ImportOutcome } from "./import-outcome";
-import { useRecordingFile } from "./use-recording-file";
-import { WholeFileForm } from "./whole-file-form";
+import { useInspection } from "./use-inspection";
 
 interface Props {
   file: File;
@@ -20,9 +19,9 @@ interface Props {
 }
 
 export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
-  const { opened, problem, setMapping } = useRecordingFile(file);
+  const inspecting = useInspection(file);
+  const { inspection, problem, isBusy } = inspecting;
   const [result, setResult] = useState<ImportResult>();
-  const { format, recording } = opened ?? {};
   const target = { fileName: file.name, assets, wantedAsset: asset, imported: setResult, cancel: close };
   return (
     <Dialog title={`Import ${file.name}`} close={close}>
@@ -31,19 +30,20 @@ export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
           One file is imported at a time: {file.name} was taken, the {othersText(nOthers)} not.
         </p>
       )}
-      {problem && (
+      {problem && !inspection && (
         <p class="trouble" role="alert">
           {problem}
         </p>
       )}
-      {!problem && !opened && (
+      {isBusy && !inspection && (
         <p class="quiet" role="status">
           Reading the file…
         </p>
       )}
-      {result && format && <ImportOutcome result={result} format={format} />}
-      {!result && recording && <ImportForm recording={recording} setMapping={setMapping} {...target} />}
-      {!result && format && !recording && <WholeFileForm file={file} format={format} {...target} />}
+      {result && <ImportOutcome result={result} />}
+      {!result && inspection && (
+        <ImportForm file={file} inspection={inspection} inspecting={inspecting} {...target} />
+      )}
     </Dialog>
   );
 }

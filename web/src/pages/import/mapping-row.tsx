@@ -1,57 +1,50 @@
-import { guessFactor, type MappedColumn } from "./mapping";
+import type { FileColumn, FileQuantity } from "../../api/types";
+import { LEFT_OUT, plainText, simpleExpression, written, type SimpleExpression } from "./mapping";
 import { QUANTITY_TITLES, UNITS, type Quantity } from "./quantities";
-import { SignChoice } from "./sign-choice";
-import type { Table } from "./table";
-
-/** Number of displayed values. */
-const SHOWN = 4;
+import { rangeText } from "./range-text";
+import { UnitAndSign } from "./unit-and-sign";
 
 interface Props {
-  quantity: Quantity;
-  column: MappedColumn;
-  table: Table;
-  set: (part: Partial<MappedColumn>) => void;
+  name: Quantity;
+  found: FileQuantity;
+  columns: FileColumn[];
+  change: (expression: string) => void;
 }
 
-/** The column, unit and sign of a quantity. */
-export function MappingRow({ quantity, column: { index, factor, sign }, table, set }: Props) {
-  const word = QUANTITY_TITLES[quantity];
-  const firstRows = table.rows.slice(0, SHOWN);
-  const chooseColumn = (value: string) => {
-    if (value === "") return set({ index: null });
-    const chosen = Number(value);
-    set({ index: chosen, factor: guessFactor(quantity, table, chosen) });
-  };
+/** The column, unit and sign of a quantity, or the expression that gives it. */
+export function MappingRow({ name, found, columns, change }: Props) {
+  const { expression, reason } = found;
+  const word = QUANTITY_TITLES[name];
+  const isAbsent = expression == null || expression === LEFT_OUT;
+  const simple = isAbsent ? undefined : simpleExpression(expression, name, columns);
+  const part = { column: "", unit: UNITS[name][0]!.written, sign: "" as const, ...simple };
+  const set = (changed: Partial<SimpleExpression>) => change(written({ ...part, ...changed }));
+  const choose = (column: string) => (column === LEFT_OUT ? change(LEFT_OUT) : set({ column }));
   return (
     <tr>
       <th scope="row">{word}</th>
       <td>
         <select
           aria-label={`Column of ${word}`}
-          value={index ?? ""}
-          onChange={(e) => chooseColumn(e.currentTarget.value)}
+          value={simple ? part.column : isAbsent ? LEFT_OUT : ""}
+          onChange={(e) => choose(e.currentTarget.value)}
         >
-          <option value="">none</option>
-          {table.header.map((name, i) => (
-            <option value={i}>{name || `column ${i + 1}`}</option>
+          <option value={LEFT_OUT}>none</option>
+          {!simple && !isAbsent && <option value="">an expression</option>}
+          {columns.map(({ number, name: title, written: column }) => (
+            <option value={column}>{title || `column ${number}`}</option>
           ))}
         </select>
       </td>
-      <td>
-        <select
-          aria-label={`Unit of ${word}`}
-          value={factor}
-          onChange={(e) => set({ factor: Number(e.currentTarget.value) })}
-        >
-          {UNITS[quantity].map((unit) => (
-            <option value={unit.factor}>{unit.word}</option>
-          ))}
-        </select>
-      </td>
-      <td>{quantity !== "t_s" && <SignChoice word={word} sign={sign} choose={(sign) => set({ sign })} />}</td>
-      <td class="quiet clip">
-        {index === null ? "" : firstRows.map((row) => row[index] || "empty").join(", ")}
-      </td>
+      {simple || isAbsent ? (
+        <UnitAndSign name={name} part={part} isDisabled={isAbsent} set={set} />
+      ) : (
+        <td colSpan={2}>
+          <code>{expression}</code>
+        </td>
+      )}
+      <td class="quiet">{rangeText(name, found)}</td>
+      <td class="quiet">{plainText(reason ?? "")}</td>
     </tr>
   );
 }

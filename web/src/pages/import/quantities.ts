@@ -1,4 +1,4 @@
-/** The quantities of a recording, their titles and units. */
+/** The quantities of a recording, their titles and the units in which columns may have them. */
 
 export const QUANTITIES = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"] as const;
 export type Quantity = (typeof QUANTITIES)[number];
@@ -11,31 +11,19 @@ export const QUANTITY_TITLES: Record<Quantity, string> = {
   y_m: "Ball y",
 };
 
-export interface Unit {
+/** A unit as a mapping of columns writes it, and as people do. */
+interface Unit {
+  written: string;
   word: string;
-  /** Factor from this unit to that of the session file. */
-  factor: number;
 }
 
-const TIME: Unit[] = [
-  { word: "s", factor: 1 },
-  { word: "ms", factor: 1e-3 },
-  { word: "µs", factor: 1e-6 },
-];
-const ANGLE: Unit[] = [
-  { word: "rad", factor: 1 },
-  { word: "°", factor: Math.PI / 180 },
-  { word: "mrad", factor: 1e-3 },
-];
-const LENGTH: Unit[] = [
-  { word: "m", factor: 1 },
-  { word: "mm", factor: 1e-3 },
-  { word: "cm", factor: 1e-2 },
-  { word: "in", factor: 0.0254 },
-];
+const unit = (written: string, word = written): Unit => ({ written, word });
+
+const ANGLE = [unit("rad"), unit("deg", "°"), unit("mrad")];
+const LENGTH = [unit("m"), unit("mm"), unit("cm"), unit("in")];
 
 export const UNITS: Record<Quantity, Unit[]> = {
-  t_s: TIME,
+  t_s: [unit("s"), unit("ms"), unit("us", "µs"), unit("ns")],
   cmd_qx_rad: ANGLE,
   cmd_qy_rad: ANGLE,
   x_m: LENGTH,

@@ -1,9 +1,9 @@
 import { useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
-import { withFormat, type FormatName } from "../../api/formats";
 import type { ImportResult } from "../../api/types";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
+import type { Reading } from "./use-inspection";
 
 export interface ImportProps {
   fileName: string;
@@ -24,12 +24,12 @@ export function useImport({ fileName, assets, wantedAsset = "", imported }: Impo
   const [session, setSession] = useState(withoutExtension(fileName));
   /** Rigs that were registered for an import that has failed. */
   const registered = useRef<string[]>([]);
-  const send = async (file: string | File, format: FormatName) => {
+  const send = async (file: File, reading: Reading) => {
     if (![...assets, ...registered.current].includes(asset)) {
       await api.createAsset({ name: asset });
       registered.current.push(asset);
     }
-    const result = await withFormat(format, () => api.importRecording(asset, session, file, format));
+    const result = await api.importRecording(asset, session, file, reading);
     if (result.rejected + result.late === 0 && !result.more_sessions?.length)
       navigate(sessionPath(result.session.id));
     else imported(result);

@@ -1,0 +1,49 @@
+import { useEffect, useState } from "preact/hooks";
+import { api } from "../../api/client";
+import { errorText } from "../../api/request";
+import type { FileInspection } from "../../api/types";
+import { columnsParameter, mappingOf, type Mapping } from "./mapping";
+
+/** Largest file, bytes; also the default limit of the service. */
+const MAX_BYTES = 64 << 20;
+
+/** How a file is to be read. */
+export interface Reading {
+  columns?: string;
+  /** Rows a second of a file without a time. */
+  rate?: number;
+}
+
+/**
+ * Lets the service read a file without importing it, again after each change of the mapping. What was found last
+ * stays while the file is read again.
+ */
+export function useInspection(file: File) {
+  const [reading, setReading] = useState<Reading>({});
+  const [inspection, setInspection] = useState<FileInspection>();
+  const [problem, setProblem] = useState<string>();
+  const [isBusy, setBusy] = useState(true);
+  useEffect(() => {
+    let isLatest = true;
+    const found = async () => {
+      if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
+      return api.inspectRecording(file, reading);
+    };
+    setBusy(true);
+    setProblem(undefined);
+    found()
+      .then(
+        (result) => isLatest && setInspection(result),
+        (error: unknown) => isLatest && setProblem(errorText(error)),
+      )
+      .finally(() => isLatest && setBusy(false));
+    return () => void (isLatest = false);
+  }, [file, reading]);
+  const setColumns = (columns: string) => setReading((before) => ({ ...before, columns }));
+  const change = (part: Partial<Mapping>) =>
+    inspection && setColumns(columnsParameter({ ...mappingOf(inspection), ...part }));
+  const setRate = (rate: number | undefined) => setReading((before) => ({ ...before, rate }));
+  return { inspection, problem, isBusy, reading, change, setColumns, setRate };
+}
+
+export type Inspecting = ReturnType<typeof useInspection>;
