@@ -245,6 +245,40 @@ async fn a_dry_run_says_how_a_file_would_be_read_and_imports_nothing() {
     assert_eq!(client.get("sessions").await.expect(200)["items"], json!([]));
 }
 
+/// An asset file says once how the files of its rig are read.
+#[tokio::test]
+async fn the_asset_file_has_the_columns_of_its_files() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let odd = table("Zeit,Roll,Pitch,X,Y", &rows, ",", plain);
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    let columns = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y";
+    client.post("assets", &json!({ "name": "a", "columns": columns })).await.expect(201);
+    client.asset("b").await;
+    cli.write("a.json", &client.get("assets/a").await.text);
+    cli.write("odd.csv", &odd);
+    let replay = "replay --asset a.json --format json";
+    let hash = |file: &str| {
+        let output = cli.ok(&format!("{replay} {file}")).stdout;
+        let summary: Value = serde_json::from_str(output.lines().last().unwrap()).unwrap();
+        summary["verdict_hash"].clone()
+    };
+    // A file without these columns is read by its own names.
+    assert_eq!(hash("odd.csv"), hash("sick.csv"));
+    let import = "sessions/import?name=s";
+    let imported = client.post_text(&format!("assets/a/{import}"), "text/csv", odd.clone()).await;
+    let verdict = imported.expect(201)["session"]["verdict"].clone();
+    assert_eq!(verdict["verdict_hash"], hash("odd.csv"));
+    client.post_text(&format!("assets/b/{import}"), "text/csv", odd.clone()).await.expect(400);
+    let inspect = "assets/a/sessions/import?dry_run=true";
+    let seen = client.post_text(inspect, "text/csv", odd).await.expect(200);
+    assert!(seen["quantities"].as_array().unwrap().iter().all(|q| q["reason"].is_null()), "{seen}");
+    let wrong = json!({ "name": "c", "columns": "x_m=ball/furlong" });
+    let refused = client.post("assets", &wrong).await.expect(422);
+    assert!(refused.to_string().contains("/columns"), "{refused}");
+}
+
 #[tokio::test]
 async fn unknown_keys_of_a_batch_are_named() {
     let fixture = ServiceFixture::start().await;

@@ -65,7 +65,7 @@ test("a dropped file opens the dialogue; a file that is not a recording is refus
   await dialogue.getByLabel("Rig").fill("new-rig");
   await dialogue.getByText("There is no rig new-rig yet").waitFor();
   await dialogue.getByRole("button", { name: /^Import/ }).click();
-  await view.getByRole("heading", { name: "dropped" }).waitFor();
+  await view.getByRole("heading", { name: "dropped", exact: true }).waitFor();
   // The picture, which the service refuses.
   assert.deepEqual(
     view.errors.filter((error) => !/status of 400/.test(error)),
@@ -103,8 +103,11 @@ test("a recording as its owner has it is read by its guesses, once they are conf
   await correct.waitFor({ state: "detached" });
   assert.equal(await chosen("Unit of Ball y"), "cm");
   await dialogue.getByLabel("Rig").fill("bench");
+  await dialogue.getByLabel("Keep this mapping for further files").check();
   await dialogue.getByRole("button", { name: /^Import [\d\s]+ rows/ }).click();
-  await view.getByRole("heading", { name: "lab" }).waitFor();
+  await view.getByRole("heading", { name: "lab", exact: true }).waitFor();
+  const { columns } = await ask(service.url, "GET", "/assets/bench");
+  assert.match(columns, /^t_s=Zeit\/ms, .*y_m='Ball Y'\/cm$/);
   const { items } = await ask(service.url, "GET", "/sessions?asset=bench&name=lab");
   const verdict = items[0].verdict;
   await ask(service.url, "POST", "/assets/bench/sessions/import?name=own", rig.sick, "text/csv");

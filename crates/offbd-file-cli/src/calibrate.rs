@@ -62,7 +62,8 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
         return Err(BadArgument(reason.to_owned()).into());
     }
     let mut rig = load_rig(Some(&args.asset))?;
-    let sessions = load(&args.sessions, &args.table.options())?;
+    let options = args.table.options().of_rig(rig.columns.as_deref());
+    let sessions = load(&args.sessions, &options)?;
     let calibration = learn(&rig, &sessions, &data_hash(&args.sessions)?)
         .map_err(|e| InputError::new("cannot calibrate", e))?;
     if args.format == OutputFormat::Table {

@@ -101,6 +101,8 @@ fn export_session(args: &SessionExport, table: &TableOptions) -> anyhow::Result<
         return Err(InputError::file(&args.session, reason).into());
     }
     let setup = args.asset.as_deref().map(set_up).transpose()?;
+    let columns = setup.as_ref().and_then(|setup| setup.rig.columns.as_deref());
+    let table = &table.clone().of_rig(columns);
     let info = info(args, table, setup.as_ref())?;
     if let (Some(output), Some(format)) = (output, format) {
         write_session((&args.session, table), format, &info, output)?;

@@ -19,8 +19,9 @@ use offbd_wire::table::{ColumnMapping, RATES_HZ, TableOptions};
 /// How the tables of recordings in text are read.
 #[derive(Clone, Debug, Default, Args)]
 pub struct TableArgs {
-    /// Which columns of a text are which quantities, with units, such as
-    /// "t_s=time/ms, x_m=ball_x/mm"; `offbd inspect FILE` proposes a mapping
+    /// Which columns of a text or a sheet are which quantities, with units, such as
+    /// "t_s=time/ms, x_m=ball_x/mm"; by default `columns` of the asset file;
+    /// `offbd inspect FILE` proposes a mapping
     #[arg(long, value_name = "MAPPING")]
     columns: Option<ColumnMapping>,
     /// Rows a second of a text without a time
@@ -37,7 +38,8 @@ impl TableArgs {
     /// The options of the reader.
     #[must_use]
     pub fn options(&self) -> TableOptions {
-        TableOptions { columns: self.columns.clone().unwrap_or_default(), rate_hz: self.rate }
+        let columns = self.columns.clone().unwrap_or_default();
+        TableOptions { columns, rate_hz: self.rate, ..TableOptions::default() }
     }
 }
 
@@ -64,7 +66,8 @@ pub fn judge_file(
     path: &Path,
     options: &TableOptions,
 ) -> Result<Vec<JudgedSession>, InputError> {
-    let mut rows = open(path, options)?;
+    let options = options.clone().of_rig(setup.rig.columns.as_deref());
+    let mut rows = open(path, &options)?;
     let begin = |n_run| RecordedSession::new(setup.clone(), run_name(&session_name(path), n_run));
     let end = |session: RecordedSession| {
         session.end(|_| {}).map_err(|reason| InputError::file(path, reason))

@@ -21,7 +21,7 @@ use super::{
     session_format, time_range,
 };
 use offbd_core::vocabulary::{Invalid, in_range};
-use offbd_service::{RecordingReader, Route, Service, SessionListQuery};
+use offbd_service::{RecordingReader, Route, Service, ServiceError, SessionListQuery};
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use offbd_wire::session_file::{SessionFormat, SessionWriter};
 use offbd_wire::table::{InspectionView, MappingError, RATES_HZ, TableOptions};
@@ -78,7 +78,8 @@ pub(super) struct ImportQuery {
     name: Option<String>,
     /// Which columns of a text or a sheet are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
     /// columns and constants for each, with `*NUMBER`, `/NUMBER` or `/UNIT` behind a column. By
-    /// default, the columns with the names of the quantities; `QUANTITY=none` leaves one out.
+    /// default, those of the asset file or the columns with the names of the quantities;
+    /// `QUANTITY=none` leaves one out.
     columns: Option<String>,
     /// Rows a second of a text without a time.
     #[param(minimum = 0.001, maximum = 1000000)]
@@ -97,7 +98,7 @@ impl ImportQuery {
         if let Some(rate) = self.rate {
             in_range("?rate", rate, RATES_HZ)?;
         }
-        Ok(TableOptions { columns, rate_hz: self.rate })
+        Ok(TableOptions { columns, rate_hz: self.rate, ..TableOptions::default() })
     }
 }
 
@@ -177,9 +178,11 @@ pub(super) async fn import(
     let format = session_format::of_file(&headers)?;
     let options = query.options()?;
     let is_dry_run = query.dry_run == Some(true);
-    if !is_dry_run {
-        app.service.check_known(&asset).await?;
-    }
+    let options = match app.service.asset(&asset).await {
+        Ok(known) => options.of_rig(known.columns.as_deref()),
+        Err(ServiceError::UnknownAsset { .. }) if is_dry_run => options,
+        Err(error) => return Err(error.into()),
+    };
     let limits = &app.service.limits().requests;
     let timeout = limits.body_timeout() * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(body, limits.import_bytes, timeout, &share).await?;

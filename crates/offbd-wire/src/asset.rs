@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use super::certificate::{self, MonitorCertificateView};
 use super::json;
+use super::table::ColumnMapping;
 use super::words::ProfileWord;
 use offbd_core::diagnosis::{
     AxisCalibration, Calibration, CalibrationOrigin, Contradiction, LeftOut, Prospects,
@@ -45,6 +46,12 @@ pub struct AssetView {
     /// Learnt parameters, written by a calibration; absent on a rig that is not learnt.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationView>,
+    /// Which columns of the rig's files are which quantities, such as
+    /// `t_s=time/ms, x_m=ball_x/mm` (the parameter `columns` of an import, `--columns` of the
+    /// commands). Used for files that have the columns it names, unless a mapping is given.
+    #[schema(max_length = 4096)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<String>,
 }
 
 fn default_rate() -> f64 {
@@ -466,9 +473,16 @@ pub fn rig(view: &AssetView) -> Result<Rig, Invalid> {
         mapping: mapping(&view.axes.clone().unwrap_or_default())?,
         diagnostics: diagnostics(&view.diagnostics.clone().unwrap_or_default())?,
         calibration: view.calibration.as_ref().map(calibration).transpose()?.map(Box::new),
+        columns: view.columns.as_deref().map(columns).transpose()?,
     };
     rig.check()?;
     Ok(rig)
+}
+
+fn columns(text: &str) -> Result<Box<str>, Invalid> {
+    let mapping = text.parse::<ColumnMapping>();
+    mapping.map_err(|error| Invalid::new("/columns", error.to_string()))?;
+    Ok(text.into())
 }
 
 fn plate(view: &PlateView) -> Result<Plate, Invalid> {
@@ -694,6 +708,7 @@ pub fn view(rig: &Rig) -> AssetView {
             debounce_s: rig.diagnostics.debounce_s,
         }),
         calibration: rig.calibration.as_deref().map(calibration_view),
+        columns: rig.columns.as_deref().map(str::to_owned),
     }
 }
 

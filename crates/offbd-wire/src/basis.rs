@@ -25,7 +25,7 @@ impl Basis {
     #[must_use]
     pub fn of(setup: &Setup) -> Self {
         let mut file = view(&setup.rig);
-        (file.name, file.calibration) = (String::new(), None);
+        (file.name, file.calibration, file.columns) = (String::new(), None, None);
         // The profile in use counts, which may differ from that of the file.
         file.diagnostics.get_or_insert_default().profile = None;
         let hash = Sha256::digest(canonical(&file, &setup.settings).to_string());

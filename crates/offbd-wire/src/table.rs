@@ -44,6 +44,27 @@ pub struct TableOptions {
     pub columns: ColumnMapping,
     /// Rows a second of a table without a time.
     pub rate_hz: Option<f64>,
+    /// The columns of the rig's files, for a table that has them all; unless there are `columns`.
+    pub of_rig: ColumnMapping,
+}
+
+impl TableOptions {
+    /// Returns the options for files of a rig whose asset file has these `columns`.
+    #[must_use]
+    pub fn of_rig(self, columns: Option<&str>) -> Self {
+        // The asset file has been checked.
+        let of_rig = columns.and_then(|columns| columns.parse().ok()).unwrap_or_default();
+        Self { of_rig, ..self }
+    }
+
+    /// Returns the options for a table.
+    fn of_table(&self, dialect: &Dialect) -> Self {
+        let mut own = self.clone();
+        if own.columns.is_empty() && columns::has_all(dialect, &own.of_rig) {
+            own.columns = std::mem::take(&mut own.of_rig);
+        }
+        own
+    }
 }
 
 /// Why a file is not a table of samples.
@@ -143,6 +164,7 @@ impl<'a> TableReader<'a> {
         options: &TableOptions,
     ) -> Result<Self, CsvError> {
         let table = find_table(source)?;
+        let options = &options.of_table(&table.dialect);
         let is_named = options.columns.expressions[0].is_none() && options.rate_hz.is_none();
         if is_named && let Some(error) = guess::wrong_time_unit(&table.dialect) {
             return Err(error);

@@ -110,8 +110,8 @@ export const api = {
   removeRemark: (session: string, id: string) =>
     send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
   /** Reads a file without importing it. */
-  inspectRecording: (file: File, reading: { columns?: string; rate?: number }) =>
-    sendFile<FileInspection>("any", file, { ...reading, dry_run: true }),
+  inspectRecording: (asset: string, file: File, reading: { columns?: string; rate?: number }) =>
+    sendFile<FileInspection>(asset, file, { ...reading, dry_run: true }),
   importRecording: (asset: string, name: string, file: File, reading: { columns?: string; rate?: number }) =>
     sendFile<ImportResult>(asset, file, { ...reading, name }),
   replay: (session: string, settings: ReplaySettings) =>

@@ -76,6 +76,9 @@ pub struct Rig {
     pub diagnostics: DiagnosticsSpec,
     /// Boxed: it is most of a rig, and many rigs have none.
     pub calibration: Option<Box<Calibration>>,
+    /// Which columns of the rig's files are which quantities, for the readers of files.
+    #[serde(default)]
+    pub columns: Option<Box<str>>,
 }
 
 /// Distance between ball and edge at which contact may begin, m. Chosen.
@@ -98,6 +101,7 @@ impl Rig {
             mapping: AxisMapping::default(),
             diagnostics: DiagnosticsSpec::default(),
             calibration: None,
+            columns: None,
         }
     }
 

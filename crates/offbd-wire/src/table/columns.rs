@@ -170,6 +170,24 @@ impl BoundMapping {
     }
 }
 
+/// Whether a table has all columns that `mapping` names.
+pub(super) fn has_all(dialect: &Dialect, mapping: &ColumnMapping) -> bool {
+    let mut terms = mapping.expressions.iter().flatten().flat_map(|e| &e.terms);
+    terms.all(|term| term.column.as_ref().is_none_or(|name| place(dialect, name).is_some()))
+}
+
+/// Returns where the column is.
+fn place(dialect: &Dialect, name: &ColumnName) -> Option<usize> {
+    match name {
+        ColumnName::Number(number) => Some(number - 1).filter(|i| *i < dialect.n_columns()),
+        ColumnName::Name(name) => {
+            let exact = dialect.names.iter().position(|column| column == name);
+            let same = |column: &String| column.eq_ignore_ascii_case(name);
+            exact.or_else(|| dialect.names.iter().position(same))
+        }
+    }
+}
+
 /// Finds the columns of an expression.
 fn bind(
     dialect: &Dialect,
@@ -177,16 +195,7 @@ fn bind(
     expression: &Expression,
 ) -> Result<BoundColumns, CsvError> {
     let column = |name: &ColumnName| -> Result<usize, CsvError> {
-        let n = dialect.n_columns();
-        let found = match name {
-            ColumnName::Number(number) => Some(number - 1).filter(|i| *i < n),
-            ColumnName::Name(name) => {
-                let exact = dialect.names.iter().position(|column| column == name);
-                let same = |column: &String| column.eq_ignore_ascii_case(name);
-                exact.or_else(|| dialect.names.iter().position(same))
-            }
-        };
-        found.ok_or_else(|| {
+        place(dialect, name).ok_or_else(|| {
             let reason = match guess::nearest(dialect, name) {
                 Some(near) => format!(
                     "is not a column of the file; the nearest is `{near}`, of {}",

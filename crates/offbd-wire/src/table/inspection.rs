@@ -163,6 +163,7 @@ fn inspect_text(
     layout(&mut view, &table);
     let dialect = table.dialect.clone();
     drop(table);
+    let options = &options.of_table(&dialect);
     let (mut mapping, mut guesses) = guess::mapping(&dialect, &options.columns);
     let mut rate_hz = options.rate_hz;
     if mapping.expressions[0].is_none() && rate_hz.is_none() {
@@ -208,7 +209,7 @@ fn read_table(
     rate_hz: Option<f64>,
 ) -> Result<Vec<Sample>, SessionFileError> {
     source.rewind()?;
-    let options = TableOptions { columns: mapping.clone(), rate_hz };
+    let options = TableOptions { columns: mapping.clone(), rate_hz, ..TableOptions::default() };
     match TableReader::recording(source, &options) {
         Ok(rows) => read(view, &mut CsvRows(rows)),
         Err(CsvError::MissingColumn { name, .. }) => {

@@ -86,7 +86,8 @@ fn recorded(
     columns: &str,
     rate_hz: Option<f64>,
 ) -> Result<Vec<(usize, Sample)>, String> {
-    let options = TableOptions { columns: columns.parse().unwrap(), rate_hz };
+    let options =
+        TableOptions { columns: columns.parse().unwrap(), rate_hz, ..TableOptions::default() };
     let mut reader =
         TableReader::recording(text.as_bytes(), &options).map_err(|e| e.to_string())?;
     let mut rows = Vec::new();

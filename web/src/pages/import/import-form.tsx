@@ -1,6 +1,5 @@
-import { api } from "../../api/client";
+import { useState } from "preact/hooks";
 import type { FileInspection } from "../../api/types";
-import { useQuery } from "../../hooks/use-query";
 import { FileColumns } from "./file-columns";
 import { FileRemarks } from "./file-remarks";
 import { ImportButtons } from "./import-buttons";
@@ -17,24 +16,16 @@ interface Props extends ImportProps {
   file: File;
   inspection: FileInspection;
   inspecting: Inspecting;
-}
-
-/** The samples per second of the chosen rig. */
-function useRate(name: string, known: string[]): number | undefined {
-  const isKnown = known.includes(name);
-  const { data } = useQuery(
-    () => (isKnown ? api.asset(name) : Promise.resolve(undefined)),
-    `${name} ${isKnown}`,
-  );
-  return data?.sample_rate_hz;
+  /** The samples per second of the chosen rig. */
+  rigRate?: number;
 }
 
 /** Imports a file whose columns are assigned here. */
-export function ImportForm({ file, inspection, inspecting, ...props }: Props) {
+export function ImportForm({ file, inspection, inspecting, rigRate, ...props }: Props) {
   const { problem, isBusy, reading, change, setColumns, setRate } = inspecting;
   const { rate } = reading;
   const { target, send } = useImport(props);
-  const rigRate = useRate(target.asset, target.assets);
+  const [isKept, setKept] = useState(false);
   const mapping = mappingOf(inspection);
   const isText = inspection.columns.length > 0;
   const hasTime = mapping.t_s !== "" && mapping.t_s !== LEFT_OUT;
@@ -43,6 +34,12 @@ export function ImportForm({ file, inspection, inspecting, ...props }: Props) {
       <ImportTarget {...target} />
       {isText && <MappingTable inspection={inspection} change={change} />}
       {isText && !hasTime && <RateField rate={rate} setRate={setRate} />}
+      {isText && inspection.mapping !== "" && (
+        <label>
+          <input type="checkbox" checked={isKept} onChange={(e) => setKept(e.currentTarget.checked)} /> Keep
+          this mapping for further files
+        </label>
+      )}
       {isText && <MappingText mapping={reading.columns ?? columnsParameter(mapping)} change={setColumns} />}
       {isText && <FileColumns columns={inspection.columns} isOpen={inspection.rows === 0} />}
       {inspection.rows > 0 && <Preview inspection={inspection} />}
@@ -53,7 +50,7 @@ export function ImportForm({ file, inspection, inspecting, ...props }: Props) {
         isBusy={isBusy}
         lacksRate={!hasTime && rate === undefined}
         hasAsset={target.asset !== ""}
-        send={() => send(file, isText ? { columns: columnsParameter(mapping), rate } : {})}
+        send={() => send(file, isText ? { columns: columnsParameter(mapping), rate } : {}, isKept)}
         cancel={props.cancel}
       />
     </>

@@ -1,6 +1,8 @@
 /** The dialog for importing a file as a session: column mapping, preview and checks. */
 import { useState } from "preact/hooks";
+import { api } from "../../api/client";
 import type { ImportResult } from "../../api/types";
+import { useQuery } from "../../hooks/use-query";
 import { Dialog } from "../../parts/dialog";
 import { count } from "../../words/numbers";
 import { ImportForm } from "./import-form";
@@ -19,10 +21,23 @@ interface Props {
 }
 
 export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
-  const inspecting = useInspection(file);
+  const [rig, setRig] = useState(asset ?? "");
+  const isKnown = assets.includes(rig);
+  const { data: known } = useQuery(
+    () => (isKnown ? api.asset(rig) : Promise.resolve(undefined)),
+    `${rig} ${isKnown}`,
+  );
+  const inspecting = useInspection(file, known?.columns ? rig : undefined);
   const { inspection, problem, isBusy } = inspecting;
   const [result, setResult] = useState<ImportResult>();
-  const target = { fileName: file.name, assets, wantedAsset: asset, imported: setResult, cancel: close };
+  const target = {
+    fileName: file.name,
+    assets,
+    asset: rig,
+    setAsset: setRig,
+    imported: setResult,
+    cancel: close,
+  };
   return (
     <Dialog title={`Import ${file.name}`} close={close}>
       {nOthers > 0 && (
@@ -42,7 +57,13 @@ export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
       )}
       {result && <ImportOutcome result={result} />}
       {!result && inspection && (
-        <ImportForm file={file} inspection={inspection} inspecting={inspecting} {...target} />
+        <ImportForm
+          file={file}
+          inspection={inspection}
+          inspecting={inspecting}
+          rigRate={known?.sample_rate_hz}
+          {...target}
+        />
       )}
     </Dialog>
   );

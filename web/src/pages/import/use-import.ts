@@ -9,8 +9,8 @@ export interface ImportProps {
   fileName: string;
   /** The names of all rigs. */
   assets: string[];
-  /** The rig that is proposed. */
-  wantedAsset?: string;
+  asset: string;
+  setAsset: (name: string) => void;
   /** Called with the result if not all rows were accepted, or if there are several sessions. */
   imported: (result: ImportResult) => void;
   cancel: () => void;
@@ -19,15 +19,18 @@ export interface ImportProps {
 const withoutExtension = (name: string) => name.replace(/\.\w+$/, "");
 
 /** Where a recording is imported to, and its import, which registers the rig if it is new. */
-export function useImport({ fileName, assets, wantedAsset = "", imported }: ImportProps) {
-  const [asset, setAsset] = useState(wantedAsset);
+export function useImport({ fileName, assets, asset, setAsset, imported }: ImportProps) {
   const [session, setSession] = useState(withoutExtension(fileName));
   /** Rigs that were registered for an import that has failed. */
   const registered = useRef<string[]>([]);
-  const send = async (file: File, reading: Reading) => {
+  /** Imports the file; `isKept` tells whether further files of the rig are read in the same way. */
+  const send = async (file: File, reading: Reading, isKept: boolean) => {
+    const columns = isKept ? reading.columns : undefined;
     if (![...assets, ...registered.current].includes(asset)) {
-      await api.createAsset({ name: asset });
+      await api.createAsset({ name: asset, columns });
       registered.current.push(asset);
+    } else if (columns) {
+      await api.putAsset({ ...(await api.asset(asset)), columns });
     }
     const result = await api.importRecording(asset, session, file, reading);
     if (result.rejected + result.late === 0 && !result.more_sessions?.length)

@@ -7,6 +7,9 @@ import { columnsParameter, mappingOf, type Mapping } from "./mapping";
 /** Largest file, bytes; also the default limit of the service. */
 const MAX_BYTES = 64 << 20;
 
+/** A name for the rig of a file before one is chosen; it need not exist. */
+const ANY_RIG = "any";
+
 /** How a file is to be read. */
 export interface Reading {
   columns?: string;
@@ -15,10 +18,10 @@ export interface Reading {
 }
 
 /**
- * Lets the service read a file without importing it, again after each change of the mapping. What was found last
- * stays while the file is read again.
+ * Lets the service read a file without importing it, as the files of a rig if one is chosen; again after each
+ * change of the mapping. What was found last stays while the file is read again.
  */
-export function useInspection(file: File) {
+export function useInspection(file: File, rig: string | undefined) {
   const [reading, setReading] = useState<Reading>({});
   const [inspection, setInspection] = useState<FileInspection>();
   const [problem, setProblem] = useState<string>();
@@ -27,7 +30,7 @@ export function useInspection(file: File) {
     let isLatest = true;
     const found = async () => {
       if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
-      return api.inspectRecording(file, reading);
+      return api.inspectRecording(rig ?? ANY_RIG, file, reading);
     };
     setBusy(true);
     setProblem(undefined);
@@ -38,7 +41,7 @@ export function useInspection(file: File) {
       )
       .finally(() => isLatest && setBusy(false));
     return () => void (isLatest = false);
-  }, [file, reading]);
+  }, [file, rig, reading]);
   const setColumns = (columns: string) => setReading((before) => ({ ...before, columns }));
   const change = (part: Partial<Mapping>) =>
     inspection && setColumns(columnsParameter({ ...mappingOf(inspection), ...part }));

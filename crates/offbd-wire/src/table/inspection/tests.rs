@@ -17,7 +17,7 @@ fn recording(header: &str, factors: [f64; 5]) -> std::io::Cursor<Vec<u8>> {
 }
 
 fn inspected(header: &str, factors: [f64; 5], columns: &str) -> InspectionView {
-    let options = TableOptions { columns: columns.parse().unwrap(), rate_hz: None };
+    let options = TableOptions { columns: columns.parse().unwrap(), ..TableOptions::default() };
     inspect(recording(header, factors), &options).unwrap()
 }
 
@@ -135,7 +135,8 @@ fn a_mapping_that_is_given_is_used() {
     let view = inspected("a;b;c;d;e", [1.0; 5], "");
     assert!(remarks(&view)[0].contains("there is no time"), "{:?}", view.remarks);
     assert_eq!(view.rows, 0);
-    let options = TableOptions { columns: "x_m=nope/mm".parse().unwrap(), rate_hz: None };
+    let options =
+        TableOptions { columns: "x_m=nope/mm".parse().unwrap(), ..TableOptions::default() };
     let error = inspect(recording("t_s;b;c;d;e", [1.0; 5]), &options).unwrap_err().to_string();
     assert!(error.contains("`nope`: is not a column of the file, which has `t_s`"), "{error}");
 }
