@@ -67,7 +67,7 @@ fn write_text(
             writeln!(out, "      {quantity}={expression}")?;
         }
     }
-    if view.mapping.is_empty() && view.rows == 0 {
+    if view.rows == 0 {
         let example = "--columns \"t_s=#1/ms, cmd_qy_rad=#2/deg, x_m=#3*0.0001-0.2\"";
         writeln!(out, "\nSay which column is what, for example with {example},")?;
         writeln!(out, "and the rate with --rate if no column has the time.")?;

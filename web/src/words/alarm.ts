@@ -33,6 +33,9 @@ export function alarmState(
   if (muted) return { text: `not tested (muted by ${muted.by})`, look: "status-cleared" };
   // Whether data arrive is watched without a session, too.
   const isNow = code === "communication_lost" || (tested && session_open);
+  const isSuspected = failing && status === "pending";
+  if (isSuspected)
+    return { text: isNow ? "△ suspected" : "suspected when last tested", look: "status-pending" };
   if (failing) return { text: isNow ? "▲ fails now" : "▲ failed when last tested", look: "status-confirmed" };
   if (status === "healed") return { text: "healed", look: "status-healed" };
   return { text: `passes, on record as ${status}`, look: "status-pending" };

@@ -22,12 +22,16 @@ export function ambiguousCauses(candidates: Candidate[]): string {
 
 type Finding = Pick<FaultLine, "code" | "kind" | "status">;
 
-/** Returns the title of a fault with its kind, or its candidates if its monitor could not distinguish them. */
+/**
+ * Returns the title of a fault with the kind that was confirmed first and those named later, or its candidates if its
+ * monitor could not distinguish them.
+ */
 function faultText(summary: Summary, code: FaultCode, lines: Finding[]): string {
   const monitor = summary.monitors?.find((each) => each.code === code && each.outcome === "cannot tell");
   const confirmed = lines.filter((line) => line.code === code && line.status === "confirmed");
-  const kind = confirmed.map((line) => line.kind).findLast((kind) => kind);
-  return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code) + (kind ? ` (${kind})` : "");
+  const kinds = new Set(confirmed.flatMap(({ kind }) => (kind ? [kind] : [])));
+  const named = kinds.size ? ` (${[...kinds].join(", later ")})` : "";
+  return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code) + named;
 }
 
 export interface Verdict {

@@ -66,6 +66,9 @@ test("a rig is tested while only its lost communication is muted", () => {
   const failing = { ...alarm, code: "sensor", muted: null };
   assert.equal(alarmState(failing).text, "▲ fails now");
   assert.equal(alarmState({ ...failing, tested: false }).text, "▲ failed when last tested");
+  const suspected = { ...failing, status: "pending" };
+  assert.deepEqual(alarmState(suspected), { text: "△ suspected", look: "status-pending" });
+  assert.equal(alarmState({ ...suspected, tested: false }).text, "suspected when last tested");
   const ended = { ...failing, session_open: false };
   assert.equal(alarmState(ended).text, "▲ failed when last tested");
   assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ fails now");

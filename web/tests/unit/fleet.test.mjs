@@ -137,6 +137,18 @@ test("a filter selects and counts the rigs of one health", () => {
   assert.deepEqual([countRows(rows, "all"), countRows(rows, "ok"), countRows(rows, "drift")], [4, 2, 0]);
 });
 
+test("a rig that fell silent while it failed is counted as both", () => {
+  const lost = { silent: true, communication_lost_since: ago(5) };
+  const entries = [
+    rig("failing", { faults: [fault("confirmed", "sensor")] }),
+    rig("both", { faults: [fault("confirmed", "sensor")], ...lost }),
+    rig("ended", { session_id: null, ...lost }),
+  ];
+  const found = entries.map((entry) => rowOf(entry, nameRanks([])));
+  assert.deepEqual([countRows(found, "fault"), countRows(found, "silent")], [2, 1]);
+  assert.equal(chosenRows(found, "silent", "", "name")[0].entry.asset, "both");
+});
+
 test("a tag selects its rigs, and the group with the worst rig is the first", () => {
   const rigs = [
     rig("well", { tags: ["hall-1", "spare"] }),

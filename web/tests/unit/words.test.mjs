@@ -178,7 +178,7 @@ test("a message is told without codes and times of the interface", () => {
   assert.doesNotMatch(deliverySummary("a: last heard 2026-11-25T20:02:59.031397Z"), /T20/);
 });
 
-test("a verdict tells the kinds of its faults, as the last lines about them do", () => {
+test("a verdict tells the kind that was confirmed first, and those named later", () => {
   const of = { outcome: "fault", faults: ["x_servo", "sensor"], monitors: [] };
   const line = (code, status, kind) => ({ code, status, kind });
   const lines = [
@@ -190,4 +190,6 @@ test("a verdict tells the kinds of its faults, as the last lines about them do",
   ];
   assert.equal(verdict(of, lines).text, "X servo (dead), Position sensor");
   assert.equal(verdict(of).text, "X servo, Position sensor");
+  const revised = [line("x_servo", "confirmed", "offset"), line("x_servo", "confirmed", "slow")];
+  assert.equal(verdict(of, revised).text, "X servo (offset, later slow), Position sensor");
 });

@@ -8,7 +8,7 @@ import { alarmCodeTitle } from "../../words/alarm";
 import { NONE, number } from "../../words/numbers";
 import { severity } from "../../words/severity";
 import { dateTime, sinceText, timeAgo } from "../../words/time";
-import type { FleetRow as Row } from "./rows";
+import { isSilent, type FleetRow as Row } from "./rows";
 
 /** Lag from which on it is highlighted, s. */
 const LATE_S = 2;
@@ -29,15 +29,25 @@ const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
 
 const COMMUNICATION = "communication_lost";
 
+/** The faults, the worst first. What failed when data stopped is not known to fail now. */
+function Faults({ entry }: { entry: Row["entry"] }) {
+  const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
+  const hasSession = entry.session_id != null && !isSilent({ entry });
+  return (
+    <>
+      {faults.map((fault) => (
+        <FaultChip fault={fault} hasSession={hasSession} since={fault.failed_at} />
+      ))}
+    </>
+  );
+}
+
 /** Faults, warnings, and what is not tested. */
 function Findings({ entry }: { entry: Row["entry"] }) {
-  const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
   const isMuted = entry.muted?.some(({ code }) => code === COMMUNICATION);
   return (
     <span class="faults">
-      {faults.map((fault) => (
-        <FaultChip fault={fault} hasSession={entry.session_id != null} since={fault.failed_at} />
-      ))}
+      <Faults entry={entry} />
       {entry.warnings.map((warning) => (
         <DriftChip warning={warning} />
       ))}
@@ -69,7 +79,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           not up to date
         </span>
       )}
-      {!faults.length &&
+      {!entry.faults.length &&
         !entry.warnings.length &&
         !entry.unjudged &&
         !entry.stale &&
@@ -81,6 +91,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
 
 export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt: number }) {
   const { word, meaning } = NOT_LEARNT[entry.learning];
+  const hasLag = entry.session_id != null && !isSilent({ entry });
   return (
     <Link to={rigPath(entry.asset)} class={`fleet-row row-${health}`}>
       <span class="name">
@@ -96,9 +107,9 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
       <HealthMark health={health} />
       <Findings entry={entry} />
       <span class="quiet clip">{entry.session ?? "–"}</span>
-      <span class={`n${entry.session_id && (entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
+      <span class={`n${hasLag && (entry.lag_s ?? 0) > LATE_S ? " late" : ""}`}>
         <span class="only-small">lag </span>
-        {entry.session_id ? number(entry.lag_s, 1, "s") : NONE}
+        {hasLag ? number(entry.lag_s, 1, "s") : NONE}
       </span>
       <span class="n quiet">{timeAgo(entry.last_seen, seenAt)}</span>
     </Link>

@@ -80,13 +80,21 @@ const COMPARE: Record<Sort, (a: FleetRow, b: FleetRow) => number> = {
   lag: (a, b) => (b.entry.lag_s ?? -1) - (a.entry.lag_s ?? -1),
 };
 
+/** Whether no data arrive from a rig whose session is open. */
+export const isSilent = ({ entry }: Pick<FleetRow, "entry">) =>
+  Boolean(entry.session_id && (entry.silent || entry.communication_lost_since));
+
+/** A rig that fell silent while it failed is one of both. */
+const belongs = (row: FleetRow, filter: HealthFilter) =>
+  filter === "all" || row.health === filter || (filter === "silent" && isSilent(row));
+
 /** Returns the rows that match the filter and the search, in order. */
 export function chosenRows(rows: FleetRow[], filter: HealthFilter, text: string, sort: string): FleetRow[] {
   const compare = COMPARE[sort in SORTS ? (sort as Sort) : "severity"];
   return rows
-    .filter((row) => (filter === "all" || row.health === filter) && (!text || matches(row.entry, text)))
+    .filter((row) => belongs(row, filter) && (!text || matches(row.entry, text)))
     .sort((a, b) => compare(a, b) || a.nameRank - b.nameRank);
 }
 
 export const countRows = (rows: FleetRow[], filter: HealthFilter) =>
-  filter === "all" ? rows.length : rows.filter((row) => row.health === filter).length;
+  rows.filter((row) => belongs(row, filter)).length;

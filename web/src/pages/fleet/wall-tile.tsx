@@ -9,9 +9,12 @@ import type { FleetRow } from "./rows";
 
 /** The worst finding of a rig in a few words. */
 function worstFinding({ entry }: FleetRow): string {
-  if (entry.communication_lost_since) return `no data since ${sinceText(entry.communication_lost_since)}`;
   const [worst] = [...entry.faults].sort((a, b) => severity(b) - severity(a));
   const [drift] = entry.warnings;
+  const lost = entry.communication_lost_since;
+  const silence = lost ? `no data since ${sinceText(lost)}` : "";
+  if (silence && worst?.failing) return `${faultTitle(worst.code, worst.kind)}, then ${silence}`;
+  if (silence) return silence;
   if (!worst && drift) return `${driftTitle(drift)}: ${driftText(drift)}`;
   if (!worst) return entry.unjudged?.reason ?? entry.session ?? "";
   const since = worst.failing && worst.failed_at ? ` since ${sinceText(worst.failed_at)}` : "";

@@ -15,16 +15,21 @@ export function Differences({ differences }: Pick<NonNullable<Replay["result"]>,
           <tr>
             <th class="n">Time</th>
             <th>Recorded</th>
+            <th class="n">Time</th>
             <th>Judged again</th>
+            <th class="n">Moved</th>
           </tr>
         </thead>
         <tbody>
-          {differences.slice(0, SHOWN).map(({ recorded, replayed }) => (
+          {differences.slice(0, SHOWN).map(({ recorded, replayed, moved_s }) => (
             <tr>
-              <td class="n">{seconds((recorded ?? replayed)?.t_s)}</td>
               {[recorded, replayed].map((line) => (
-                <td>{line ? describe(line) : <span class="quiet">{NONE}</span>}</td>
+                <>
+                  <td class="n">{seconds(line?.t_s)}</td>
+                  <td>{line ? describe(line) : <span class="quiet">{NONE}</span>}</td>
+                </>
               ))}
+              <td class="n">{moved_s ? movedText(moved_s) : ""}</td>
             </tr>
           ))}
         </tbody>
@@ -32,6 +37,8 @@ export function Differences({ differences }: Pick<NonNullable<Replay["result"]>,
     </div>
   );
 }
+
+const movedText = (by: number) => `${seconds(Math.abs(by))} ${by < 0 ? "earlier" : "later"}`;
 
 function describe(line: FaultLine) {
   const { text, look } = changeOf(line);
