@@ -46,7 +46,7 @@ impl TableArgs {
 /// Loads the rig of an asset file; without a path, the default rig.
 pub fn load_rig(path: Option<&Path>) -> Result<Rig, InputError> {
     let Some(path) = path else { return Ok(Rig::chapter("chapter")) };
-    asset::parse(&read(path)?).map_err(|e| InputError::file(path, e))
+    asset::parse_new(&read(path)?).map_err(|e| InputError::file(path, e))
 }
 
 /// The setup of an engine that judges `rig` by `profile`.

@@ -38,5 +38,5 @@ fn unusable(error: impl std::fmt::Display) -> PyErr {
 
 /// Returns the rig of an asset file; without one, the chapter's rig.
 fn rig(asset_file: Option<&str>) -> Result<Rig, Invalid> {
-    asset_file.map_or_else(|| Ok(Rig::chapter("chapter")), |text| asset::parse(text.as_bytes()))
+    asset_file.map_or_else(|| Ok(Rig::chapter("chapter")), |text| asset::parse_new(text.as_bytes()))
 }

@@ -453,6 +453,27 @@ pub fn parse(document: &[u8]) -> Result<Rig, Invalid> {
     rig(&json::parse(document)?)
 }
 
+/// Parses an asset file that somebody gives: what has been stored is not refused any more.
+///
+/// # Errors
+/// Those of [`parse`], and [`Invalid`] for a ball that does not fit on its plate.
+pub fn parse_new(document: &[u8]) -> Result<Rig, Invalid> {
+    let rig = parse(document)?;
+    // Of a beam, the width may be smaller than the ball.
+    let (longest_m, size) = match rig.plate.shape() {
+        PlateShape::Round { diameter_m } => (diameter_m, format!("{diameter_m} m wide")),
+        PlateShape::Rectangle { length_m, width_m } => {
+            (length_m.max(width_m), format!("{length_m} m x {width_m} m large"))
+        }
+    };
+    let radius_m = rig.ball.radius_m();
+    if 2.0 * radius_m < longest_m {
+        return Ok(rig);
+    }
+    let reason = format!("a ball of {} m does not fit on a plate that is {size}", 2.0 * radius_m);
+    Err(Invalid::new("/ball/radius_m", reason))
+}
+
 /// Returns the rig that a view describes.
 ///
 /// # Errors
@@ -828,6 +849,25 @@ mod tests {
     #[test]
     fn a_file_with_only_a_name_describes_the_chapters_rig() {
         assert_eq!(parse(br#"{"name":"a"}"#).unwrap(), Rig::chapter("a"));
+    }
+
+    #[test]
+    fn a_ball_that_does_not_fit_on_its_plate_is_refused() {
+        let refused = |text: &str| parse_new(text.as_bytes()).unwrap_err().to_string();
+        let wide = r#"{"name":"a","ball":{"radius_m":0.712,"mass_kg":0.05,"inertia_factor":0.4}}"#;
+        let error = refused(wide);
+        assert!(error.contains("/ball/radius_m"), "{error}");
+        assert!(
+            error.contains("a ball of 1.424 m does not fit on a plate that is 0.38 m"),
+            "{error}"
+        );
+        let round = r#"{"name":"a","ball":{"radius_m":0.06},"plate":{"diameter_m":0.12}}"#;
+        assert!(refused(round).contains("0.12 m wide"), "{}", refused(round));
+        // What has been stored is still read, and a beam is narrower than its ball.
+        assert!(parse(wide.as_bytes()).is_ok());
+        let beam =
+            r#"{"name":"a","ball":{"radius_m":0.02},"plate":{"length_m":0.5,"width_m":0.03}}"#;
+        assert!(parse_new(beam.as_bytes()).is_ok());
     }
 
     #[test]

@@ -64,7 +64,7 @@ impl Service {
     /// [`ServiceError::Invalid`] with the invalid element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
     pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
-        let rig = asset_file::parse(document)?;
+        let rig = asset_file::parse_new(document)?;
         self.create(&rig).await?;
         Ok(asset_file::view(&rig))
     }
@@ -87,7 +87,7 @@ impl Service {
         name: &str,
         document: &[u8],
     ) -> Result<(AssetView, bool), ServiceError> {
-        let rig = asset_file::parse(document)?;
+        let rig = asset_file::parse_new(document)?;
         if rig.name != name {
             let reason = format!("`{}` differs from `{name}` in the path", rig.name);
             return Err(Invalid::new("/name", reason).into());
