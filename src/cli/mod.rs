@@ -9,6 +9,7 @@ mod backup;
 mod completions;
 #[cfg(feature = "lab")]
 mod demo;
+mod help;
 mod serve;
 mod token;
 mod usage;
@@ -16,7 +17,7 @@ mod watch;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use offbd_file_cli::{calibrate, drive_cycle, export, inspect, replay, trends};
 use offbd_forward::command as forward;
 use offbd_terminal::logging::LoggingArgs;
@@ -84,7 +85,7 @@ enum CliCommand {
 #[must_use]
 pub fn main() -> ExitCode {
     end_with_essential_threads();
-    match Cli::try_parse() {
+    match parse() {
         Ok(cli) => {
             let report =
                 |error: anyhow::Error| offbd_terminal::report(&error, error.is::<ConfigError>());
@@ -92,6 +93,13 @@ pub fn main() -> ExitCode {
         }
         Err(error) => usage::print(error),
     }
+}
+
+/// Parses the arguments of this process.
+fn parse() -> Result<Cli, clap::Error> {
+    let mut command = help::grouped(Cli::command());
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -156,7 +164,6 @@ fn end_with_essential_threads() {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     /// Returns the texts below the help of a command and of its subcommands.
     fn texts(command: &clap::Command) -> Vec<String> {
