@@ -15,7 +15,7 @@ mod traces;
 
 use std::fmt;
 use std::fs::{File, TryLockError};
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
 use std::path::Path;
 use std::pin::pin;
@@ -160,8 +160,21 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     keys.map(|keys| tokio::spawn(keys.watch(closing.clone())));
     tokio::spawn(offbd_http::keep_metrics(closing.clone()));
     tokio::spawn(keep_threads(closing));
-    tracing::info!(%address, store = %server.store.location(), "serving");
+    let page = page_url(address, config.tls.is_some());
+    tracing::info!(%address, store = %server.store.location(), %page, "serving");
     Ok(server)
+}
+
+/// Returns the address of the page as a browser on this machine opens it.
+fn page_url(address: SocketAddr, is_encrypted: bool) -> String {
+    let scheme = if is_encrypted { "https" } else { "http" };
+    // One cannot connect to "all addresses".
+    let host = match address.ip() {
+        ip if ip.is_unspecified() => "localhost".to_owned(),
+        IpAddr::V6(ip) => format!("[{ip}]"),
+        ip => ip.to_string(),
+    };
+    format!("{scheme}://{host}:{}/", address.port())
 }
 
 /// The interface of the service, with the additional routes of the demo.
@@ -493,4 +506,21 @@ pub async fn check_store(config: &Config) -> Result<Option<CheckReport>> {
     }
     let report = offbd_store::check(&location).await;
     report.map(Some).with_context(|| format!("cannot check the store {location}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_has_an_address_that_a_browser_opens() {
+        for (address, is_encrypted, page) in [
+            ("127.0.0.1:8087", false, "http://127.0.0.1:8087/"),
+            ("0.0.0.0:80", false, "http://localhost:80/"),
+            ("[::1]:8443", true, "https://[::1]:8443/"),
+            ("[::]:8087", false, "http://localhost:8087/"),
+        ] {
+            assert_eq!(page_url(address.parse().unwrap(), is_encrypted), page);
+        }
+    }
 }

@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn the_help_has_each_command_once_and_fits_in_eighty_columns() {
-        let help = super::grouped(Cli::command()).render_long_help().to_string();
+        let help = grouped(Cli::command()).render_long_help().to_string();
         assert!(help.lines().all(|line| line.chars().count() <= 80), "{help}");
         for name in ["serve", "inspect", "help"] {
             let is_line = |line: &&str| line.starts_with(&format!("  {name} "));
