@@ -318,6 +318,8 @@ async fn targets_that_are_not_permitted_are_refused() {
         ("http://evil.org/", "notifications.targets"),
         ("ftp://hooks.example/", "https://"),
         ("https://ann:secret@hooks.example/", "password"),
+        ("http://hooks.example:99999/", "port"),
+        ("http://hooks.example:0/", "port"),
         ("/hook", "https://"),
     ] {
         let new = json!({ "name": "hook", "webhook": { "url": url } });
