@@ -452,6 +452,41 @@ mod email {
         assert_eq!(delivered["error"], Value::Null);
     }
 
+    /// Whoever may change a channel must not learn its password by naming another server.
+    #[tokio::test]
+    async fn a_stored_password_is_for_its_server_alone() {
+        let fixture = ServiceFixture::start().await;
+        let client = &fixture.client;
+        let email = json!({ "host": "mail.example", "port": 587, "security": "starttls",
+            "user": "ann", "password": "very-own-password", "from": "offbd@lab.example",
+            "to": ["ann@lab.example"] });
+        let new = json!({ "name": "mail", "email": email });
+        let made = client.post("notifications/channels", &new).await.expect(201);
+        let path = format!("notifications/channels/{}", made["id"].as_str().unwrap());
+        let put = async |changes: &[(&str, Value)]| {
+            let mut email = email.clone();
+            email.as_object_mut().unwrap().remove("password");
+            changes.iter().for_each(|(key, value)| email[key] = value.clone());
+            client.put(&path, &json!({ "name": "mail", "email": email })).await
+        };
+        for (key, value) in [
+            ("host", json!("evil.example")),
+            ("port", json!(588)),
+            ("security", json!("none")),
+            ("user", json!("bob")),
+        ] {
+            let problem = put(&[(key, value.clone())]).await.problem(422);
+            assert_eq!(problem["pointer"], "/email/password", "{key}: {problem}");
+            let again = put(&[(key, value), ("password", json!("again"))]).await.expect(200);
+            assert_eq!(again["email"]["has_password"], true);
+            put(&[("password", json!("very-own-password"))]).await.expect(200);
+        }
+        let kept = put(&[("to", json!(["bob@lab.example"]))]).await.expect(200);
+        assert_eq!(kept["email"]["has_password"], true);
+        let without = put(&[("host", json!("evil.example")), ("user", Value::Null)]).await;
+        assert_eq!(without.expect(200)["email"]["has_password"], false);
+    }
+
     #[tokio::test]
     async fn invalid_mail_settings_are_refused_with_their_element() {
         let fixture = ServiceFixture::start().await;
