@@ -152,7 +152,7 @@ impl Writer {
     }
 
     /// Applies `sets` in order, in one transaction that is durable on return, and assigns
-    /// ids to their actions and transitions: consecutive ones, in the order of the commits of
+    /// ids to their actions and transitions: increasing ones, in the order of the commits of
     /// all writers of the database.
     ///
     /// # Errors
