@@ -70,6 +70,7 @@ pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
 pub use location::Location;
+pub use file::private_file;
 pub use notification::{
     ChannelRow, DeliveryRow, NotificationWrite, PlannedEventRow, ReminderRow, RuleRow,
 };
