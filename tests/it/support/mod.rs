@@ -219,10 +219,15 @@ impl Client {
     }
 
     /// The resident memory of the process, bytes.
-    pub async fn resident_bytes(&self) -> f64 {
+    /// The value of the metric without labels that has this name.
+    pub async fn metric(&self, name: &str) -> f64 {
         let metrics = self.get("/metrics").await.text;
-        let line = metrics.lines().find(|line| line.starts_with("offbd_process_resident_bytes "));
-        line.unwrap().split(' ').nth(1).unwrap().parse().unwrap()
+        let value = |line: &str| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
+        metrics.lines().find_map(value).unwrap()
+    }
+
+    pub async fn resident_bytes(&self) -> f64 {
+        self.metric("offbd_process_resident_bytes").await
     }
 
     /// The number of samples that the service has evaluated again to load its assets.

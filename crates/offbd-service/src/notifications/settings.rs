@@ -97,7 +97,7 @@ fn check_url(url: &str, targets: &TargetPolicy) -> Result<(), String> {
     }
     let host = parsed.host().filter(|host| !host.is_empty()).ok_or("has no host")?;
     let is_port_given = parsed.authority().is_some_and(|authority| authority.as_str() != host);
-    if is_port_given && !parsed.port_u16().is_some_and(|port| port > 0) {
+    if is_port_given && parsed.port_u16().is_none_or(|port| port == 0) {
         return Err("has a port that is not from 1 to 65535".to_owned());
     }
     targets.check_host(host).map_err(|reason| format!("the host {reason}"))
