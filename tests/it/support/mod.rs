@@ -24,6 +24,7 @@ pub mod provider;
 pub mod proxy;
 pub mod receiver;
 pub mod statement_gate;
+pub mod web_socket;
 #[cfg(feature = "xlsx")]
 pub mod workbook;
 
@@ -218,7 +219,6 @@ impl Client {
         .await
     }
 
-    /// The resident memory of the process, bytes.
     /// The value of the metric without labels that has this name.
     pub async fn metric(&self, name: &str) -> f64 {
         let metrics = self.get("/metrics").await.text;
@@ -226,6 +226,7 @@ impl Client {
         metrics.lines().find_map(value).unwrap()
     }
 
+    /// The resident memory of the process, bytes.
     pub async fn resident_bytes(&self) -> f64 {
         self.metric("offbd_process_resident_bytes").await
     }
