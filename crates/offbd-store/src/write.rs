@@ -21,7 +21,7 @@ mod test_faults;
 #[cfg(feature = "commit-faults")]
 pub use test_faults::{CommitFault, CommitPoint, FaultPlan};
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -367,7 +367,7 @@ impl Writer {
             journal: &self.journal,
             refused: &self.refused,
             changes: JournalChanges::default(),
-            pending: Vec::new(),
+            pending: BTreeMap::new(),
         };
         for ChangeSet { partition, writes } in sets {
             let partition = partition.unwrap_or_default();
