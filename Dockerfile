@@ -28,6 +28,10 @@ RUN --mount=type=cache,target=/usr/local/cargo/registry \
     && cp target/dist/offbd /usr/local/bin/offbd
 
 FROM debian:bookworm-slim
+# The authorities that sign the certificates of webhooks, mail servers, brokers and of the
+# provider of JSON Web Tokens.
+RUN apt-get update && apt-get install -y --no-install-recommends ca-certificates \
+    && rm -rf /var/lib/apt/lists/*
 RUN useradd --system --uid 10001 --home-dir /var/lib/offbd --create-home offbd
 COPY --from=build /usr/local/bin/offbd /usr/local/bin/offbd
 USER offbd
@@ -37,10 +41,9 @@ ENV OFFBD_LISTEN=0.0.0.0:8087 \
     OFFBD_DATA=/var/lib/offbd \
     OFFBD_LOG__FORMAT=json
 EXPOSE 8087
-# Requests /readyz on port 8087 with bash, which can open sockets and is in the base
-# image, so that curl is not needed. If you change the port, change this line.
-HEALTHCHECK --interval=10s --timeout=3s --start-period=10s CMD ["bash", "-c", \
-    "exec 3<>/dev/tcp/127.0.0.1/8087 && printf 'GET /readyz HTTP/1.0\\r\\n\\r\\n' >&3 && read -r answer <&3 && [[ $answer == *' 200 '* ]]"]
+# Asks the service where the environment says that it listens, with TLS or without. Settings that
+# you give `serve` as arguments are to be given here too.
+HEALTHCHECK --interval=10s --timeout=5s --start-period=10s CMD ["offbd", "check", "--health"]
 # `docker stop` sends SIGTERM, on which the service stops gracefully.
 ENTRYPOINT ["offbd"]
 CMD ["serve"]

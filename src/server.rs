@@ -17,7 +17,7 @@ use std::fmt;
 use std::fs::{File, TryLockError};
 use std::net::{IpAddr, SocketAddr};
 use std::num::NonZeroU32;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
@@ -270,12 +270,15 @@ async fn lock(location: &Location) -> Result<Option<File>> {
     let Some(file) = location.file() else { return Ok(None) };
     // A link to the file must not be another lock.
     let file = std::fs::canonicalize(file).unwrap_or_else(|_| file.to_owned());
-    let path = file.with_extension("lock");
+    let mut path = file.into_os_string();
+    path.push(".lock");
+    let path = PathBuf::from(path);
     if let Some(directory) = path.parent() {
         std::fs::create_dir_all(directory)
             .with_context(|| format!("`data`: cannot create {}", directory.display()))?;
     }
-    let lock = File::create(&path).with_context(|| format!("cannot create {}", path.display()))?;
+    let lock = offbd_store::private_file().create(true).truncate(false).open(&path);
+    let lock = lock.with_context(|| format!("cannot create {}", path.display()))?;
     let mut n_tries = 0;
     loop {
         n_tries += 1;

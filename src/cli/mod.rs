@@ -9,6 +9,7 @@ mod backup;
 mod completions;
 #[cfg(feature = "lab")]
 mod demo;
+mod health;
 mod help;
 mod serve;
 mod token;
@@ -148,10 +149,15 @@ fn run(cli: Cli) -> anyhow::Result<()> {
 ///   threads; tokio then waits for the others for ever;
 /// - on a thread of an SQLite connection, on which sqlx panics without memory for a value.
 ///   The rows that it had not sent yet are missing, as if the query had none.
+///
+/// A panic that means that an imported file is damaged is not reported: the reader's error is.
 fn end_with_essential_threads() {
     let main = std::thread::current().id();
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
+        if offbd_wire::session_file::is_guarded() {
+            return;
+        }
         report(panic);
         let thread = std::thread::current();
         let is_sqlite = thread.name().is_some_and(|name| name.starts_with(SQLITE_THREAD));

@@ -76,12 +76,17 @@ pub(super) struct MigrateArgs {
 /// Nothing is changed, and the service may be running.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  offbd check --config offbd.toml\n  \
-    offbd check --data /var/lib/offbd\n\n\
+    offbd check --data /var/lib/offbd\n  \
+    offbd check --health\n\n\
     Exit status: 0 valid, 3 invalid configuration; the error names the key;\n\
-    1 damaged store; each finding is printed.")]
+    1 damaged store, of which each finding is printed, or a service that is not\n\
+    ready.")]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,
+    /// Only ask the service that runs with this configuration whether it is ready
+    #[arg(long, conflicts_with = "format")]
+    health: bool,
     /// Text for people, or one JSON object
     #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
     format: OutputFormat,
@@ -146,6 +151,9 @@ impl From<CheckReport> for CheckedStore {
 
 pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
+    if args.health {
+        return offbd_terminal::block_on(super::health::ask(&config));
+    }
     let configuration = server::check(&config)?;
     let is_asked = args.config.data.is_some() || args.config.database.is_some();
     let report = match is_asked {

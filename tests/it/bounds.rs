@@ -1,7 +1,8 @@
 //! What one device or one upload may take of the service has a bound.
 
 use crate::support::process::Process;
-use crate::support::{ServiceFixture, batch, rig};
+use crate::support::web_socket::{CLOSE, TEXT, frame, open_websocket, read_frame};
+use crate::support::{DEADLINE, ServiceFixture, batch, eventually, rig};
 use offbd::config::Auth;
 use serde_json::json;
 use tokio::io::AsyncWriteExt;
@@ -39,6 +40,56 @@ async fn imports_of_invalid_rows_use_little_more_memory_than_their_files() {
     }
     let files = (6 * FILE) as f64;
     assert!(most - before < 2.5 * files, "{} MiB", (most - before) / f64::from(1 << 20));
+}
+
+/// Messages that are begun and not ended, of 56 MiB together.
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn unfinished_messages_of_streams_take_no_more_memory_than_all_bodies_may() {
+    const STREAMS: usize = 60;
+    const MESSAGE: usize = 1 << 20;
+    const SENT: usize = MESSAGE - (MESSAGE >> 4);
+    const BUDGET: usize = 8 << 20;
+    let data = tempfile::tempdir().unwrap();
+    let (budget, message) = (BUDGET.to_string(), MESSAGE.to_string());
+    let environment = [
+        ("OFFBD_LIMITS__BODIES_BYTES", std::path::Path::new(&budget)),
+        ("OFFBD_LIMITS__BATCH_BYTES", std::path::Path::new(&message)),
+    ];
+    let process = Process::start_with(data.path(), &environment);
+    let client = &process.client;
+    client.asset("a").await;
+    let mut document = batch(Some("s"), &rig(300, 300)[..50]).to_string();
+    document.extend(std::iter::repeat_n(' ', MESSAGE - 100 - document.len()));
+    let message = frame(document.as_bytes());
+    let before = client.resident_bytes().await;
+    let mut streams = Vec::new();
+    for i in 0..STREAMS {
+        let mut stream = open_websocket(&client.address).await;
+        stream.write_all(&message[..SENT]).await.unwrap();
+        streams.push(stream);
+        let held = format!("offbd_bodies_bytes {}\n", (i + 1) * SENT);
+        if (i + 1) * SENT <= BUDGET {
+            let is_held = async || client.get("/metrics").await.text.contains(&held).then_some(());
+            eventually(is_held).await;
+        }
+    }
+    let mut others = streams.split_off(BUDGET / SENT);
+    for stream in &mut others {
+        let closed = tokio::time::timeout(DEADLINE, read_frame(stream)).await;
+        let (kind, reason) = closed.expect("the stream is closed");
+        assert_eq!((kind, &reason[..2]), (CLOSE, &1013_u16.to_be_bytes()[..]));
+    }
+    let more = client.resident_bytes().await - before;
+    assert!(more < 2.5 * BUDGET as f64, "{} MiB", more / f64::from(1 << 20));
+    // Others go on, and so do those that are within the budget.
+    let samples = rig(300, 300);
+    client.post("assets/a/telemetry", &batch(Some("s"), &samples[..50])).await.expect(200);
+    streams[0].write_all(&message[SENT..]).await.unwrap();
+    let (kind, answer) = read_frame(&mut streams[0]).await;
+    assert_eq!(kind, TEXT);
+    let answer: serde_json::Value = serde_json::from_slice(&answer).unwrap();
+    assert_eq!((&answer["type"], &answer["duplicate"]), (&json!("ack"), &json!(50)), "{answer}");
 }
 
 /// One token that fills the budget of bodies and holds it turns away only itself.
@@ -84,7 +135,7 @@ async fn one_device_does_not_take_the_memory_of_all_bodies() {
         connection.write_all(&[b' '; 200_000]).await.unwrap();
         held.push(connection);
     }
-    crate::support::eventually(async || {
+    eventually(async || {
         let used = other.get("/metrics").await.text;
         used.contains("offbd_bodies_bytes 400000").then_some(())
     })

@@ -4,6 +4,7 @@
 use crate::support::{Client, Events, ServiceFixture, connection, rig, url};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
+use sqlx::Executor;
 
 async fn fault(client: &Client, asset: &str, code: &str) -> Value {
     client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
@@ -32,6 +33,30 @@ async fn a_fault_of_sovd_refers_to_its_recording() {
     let id = client.session("a", "last").await["id"].as_str().unwrap().to_owned();
     client.delete(&format!("sessions/{id}")).await.expect(204);
     assert_eq!(snapshots().await, std::slice::from_ref(frame));
+}
+
+/// The adapter for SOVD has no pages, and says where the rest is.
+#[tokio::test]
+async fn the_recordings_of_sovd_name_the_list_of_older_ones() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("s"), &rig(10, 10)).await;
+    client.end("a", "s").await;
+    let path = "/sovd/v1/components/a/bulk-data/recordings";
+    let all = client.get(path).await.expect(200);
+    assert_eq!((all["items"].as_array().unwrap().len(), all.get("x-offbd-next")), (1, None));
+    let more = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 503)
+        INSERT INTO session (id, asset, name, state, opened_at, ended_at, setup, baseline,
+            n_samples, n_rejected, verdict, verdict_hash)
+        SELECT s.id || '-' || CAST(n.i AS TEXT), s.asset, s.name || CAST(n.i AS TEXT), s.state,
+            s.opened_at, s.ended_at, s.setup, s.baseline, s.n_samples, s.n_rejected, s.verdict,
+            s.verdict_hash FROM session s, n";
+    fixture.store().await.execute(more).await.unwrap();
+    let latest = client.get(path).await.expect(200);
+    assert_eq!(latest["items"].as_array().unwrap().len(), 500);
+    let rest = client.get(latest["x-offbd-next"].as_str().unwrap()).await.expect(200);
+    assert_eq!((rest["items"].as_array().unwrap().len(), &rest["next"]), (4, &Value::Null));
 }
 
 /// Returns the fault without the key that depends on the wall clock.

@@ -278,3 +278,35 @@ async fn a_short_workbook_takes_no_gigabytes_of_memory() {
         }
     }
 }
+
+/// A reader of a library that panics on a damaged file is not a panic of the service.
+#[cfg(feature = "parquet")]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_damaged_file_leaves_no_backtrace_in_the_log() {
+    use offbd::wire::session_file;
+    use offbd::wire::table::TableOptions;
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats/polars.arrow");
+    let whole = std::fs::read(file).unwrap();
+    let damaged = |at: usize| {
+        let mut file = whole.clone();
+        file[at] ^= 0xff;
+        file
+    };
+    let contradicts = |file: &Vec<u8>| {
+        let rows = session_file::open(Cursor::new(file.clone()), None, &TableOptions::default());
+        let error = match rows {
+            Ok(rows) => rows.filter_map(Result::err).last().map(|error| error.to_string()),
+            Err(error) => Some(error.to_string()),
+        };
+        error.is_some_and(|error| error.contains("contradict each other"))
+    };
+    let file = (0..whole.len()).map(damaged).find(contradicts).expect("a reader panics");
+    let data = tempfile::tempdir().unwrap();
+    let process = Process::start_with(data.path(), &[("RUST_BACKTRACE", Path::new("1"))]);
+    process.client.asset("a").await;
+    let kind = "application/vnd.apache.arrow.stream";
+    let refused = imported(&process.client, kind, file).await.problem(400);
+    assert!(refused["detail"].as_str().unwrap().contains("contradict each other"), "{refused}");
+    let log = process.log();
+    assert!(!log.contains("panicked"), "{log}");
+}

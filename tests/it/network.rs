@@ -250,6 +250,33 @@ async fn validate_curl_and_a_websocket_client_connect_over_tls() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn check_asks_the_service_whether_it_is_ready() {
+    let directory = tempfile::tempdir().unwrap();
+    let files = certificate(directory.path());
+    let config = directory.path().join("offbd.toml");
+    let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    for tls in [None, Some(files)] {
+        let mut fixture = ServiceFixture::start_with(|config| config.tls = tls.clone()).await;
+        let mut text = format!("listen = \"{}\"\n", fixture.client.address);
+        if let Some(TlsConfig { certificate, key }) = &tls {
+            text += &format!("[tls]\ncertificate = {certificate:?}\nkey = {key:?}\n");
+        }
+        std::fs::write(&config, text).unwrap();
+        let line = format!("check --health --config {}", config.display());
+        let done = offbd(words(&line)).await;
+        assert!(done.status.success() && done.stdout.is_empty(), "{done:?}");
+        // Over TLS or not, as the configuration says.
+        if tls.is_some() {
+            let other = format!("check --health --listen {}", fixture.client.address);
+            assert_eq!(offbd(words(&other)).await.status.code(), Some(1));
+        }
+        fixture.server.take().unwrap().shutdown().await.unwrap();
+        let done = offbd(words(&line)).await;
+        assert_eq!(done.status.code(), Some(1), "{done:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn watch_connects_over_tls_if_the_certificate_is_trusted() {
     let directory = tempfile::tempdir().unwrap();
     let files = certificate(directory.path());

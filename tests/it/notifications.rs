@@ -318,6 +318,8 @@ async fn targets_that_are_not_permitted_are_refused() {
         ("http://evil.org/", "notifications.targets"),
         ("ftp://hooks.example/", "https://"),
         ("https://ann:secret@hooks.example/", "password"),
+        ("http://hooks.example:99999/", "port"),
+        ("http://hooks.example:0/", "port"),
         ("/hook", "https://"),
     ] {
         let new = json!({ "name": "hook", "webhook": { "url": url } });
@@ -448,6 +450,41 @@ mod email {
         .await;
         assert!(delivered["attempts"].as_u64() >= Some(3), "{delivered}");
         assert_eq!(delivered["error"], Value::Null);
+    }
+
+    /// Whoever may change a channel must not learn its password by naming another server.
+    #[tokio::test]
+    async fn a_stored_password_is_for_its_server_alone() {
+        let fixture = ServiceFixture::start().await;
+        let client = &fixture.client;
+        let email = json!({ "host": "mail.example", "port": 587, "security": "starttls",
+            "user": "ann", "password": "very-own-password", "from": "offbd@lab.example",
+            "to": ["ann@lab.example"] });
+        let new = json!({ "name": "mail", "email": email });
+        let made = client.post("notifications/channels", &new).await.expect(201);
+        let path = format!("notifications/channels/{}", made["id"].as_str().unwrap());
+        let put = async |changes: &[(&str, Value)]| {
+            let mut email = email.clone();
+            email.as_object_mut().unwrap().remove("password");
+            changes.iter().for_each(|(key, value)| email[key] = value.clone());
+            client.put(&path, &json!({ "name": "mail", "email": email })).await
+        };
+        for (key, value) in [
+            ("host", json!("evil.example")),
+            ("port", json!(588)),
+            ("security", json!("none")),
+            ("user", json!("bob")),
+        ] {
+            let problem = put(&[(key, value.clone())]).await.problem(422);
+            assert_eq!(problem["pointer"], "/email/password", "{key}: {problem}");
+            let again = put(&[(key, value), ("password", json!("again"))]).await.expect(200);
+            assert_eq!(again["email"]["has_password"], true);
+            put(&[("password", json!("very-own-password"))]).await.expect(200);
+        }
+        let kept = put(&[("to", json!(["bob@lab.example"]))]).await.expect(200);
+        assert_eq!(kept["email"]["has_password"], true);
+        let without = put(&[("host", json!("evil.example")), ("user", Value::Null)]).await;
+        assert_eq!(without.expect(200)["email"]["has_password"], false);
     }
 
     #[tokio::test]

@@ -14,7 +14,7 @@ use crate::support::device::DeviceLoad;
 use crate::support::link::{Link, LinkMode};
 use crate::support::postgres::Postgres;
 use crate::support::process::{Process, ended, program};
-use crate::support::{Client, ServiceFixture, batch, eventually, registration, rig};
+use crate::support::{Client, ServiceFixture, batch, connection, eventually, registration, rig};
 use futures_util::future::select;
 use offbd_core::vocabulary::Sample;
 use reqwest::Method;
@@ -62,7 +62,7 @@ async fn a_restarted_database_server_loses_nothing() {
         load.link.wait_for_samples(100).await;
         let cut = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity
             WHERE pid <> pg_backend_pid() AND datname = current_database()";
-        crate::support::connection(&url).await.execute(cut).await.unwrap();
+        connection(&url).await.execute(cut).await.unwrap();
     }
     load.stop().await;
 }
@@ -154,6 +154,70 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     let others: Vec<_> = link.refusals().into_iter().filter(|r| !looks_up(r)).collect();
     assert_eq!(others, Vec::<String>::new());
     proxy.abort();
+}
+
+/// Changes by which a disk is full for samples, and only for these, and is not any more.
+pub(crate) const FULL: &str = "CREATE FUNCTION full_disk() RETURNS trigger AS $$
+    BEGIN RAISE EXCEPTION 'could not extend file: No space left on device'
+        USING ERRCODE = 'disk_full'; END $$ LANGUAGE plpgsql;
+    CREATE TRIGGER full_disk BEFORE INSERT ON journal EXECUTE FUNCTION full_disk()";
+pub(crate) const ROOM: &str = "DROP FUNCTION full_disk CASCADE";
+
+/// Waits until commits have failed `n` times, while the service is never ready.
+pub(crate) async fn failing_commits(client: &Client, n: f64) {
+    eventually(async || {
+        assert_eq!(client.get("/readyz").await.status, 503);
+        (client.metric("offbd_commit_failures_total").await >= n).then_some(())
+    })
+    .await;
+}
+
+/// What else is written is smaller and may find room, as the probe of the connection does.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_disk_that_is_full_for_samples_alone_is_reported_until_they_find_room() {
+    let (server, data) = (Postgres::new(), tempfile::tempdir().unwrap());
+    let url = server.database("twin");
+    let process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&url))]);
+    let client = &process.client;
+    client.asset("a").await;
+    let samples = rig(300, 300);
+    client.telemetry("a", Some("s"), &samples[..100]).await;
+    let mut store = connection(&url).await;
+    let writers = "SELECT pid::bigint FROM pg_locks WHERE locktype = 'advisory'";
+    let before: Vec<i64> = sqlx::query_scalar(writers).fetch_all(&mut store).await.unwrap();
+    assert!(!before.is_empty());
+    for part in [&samples[100..200], &samples[200..300]] {
+        let n_bytes = process.log().len();
+        store.execute(FULL).await.unwrap();
+        send(client, part);
+        let reason = client.readiness(503).await;
+        assert!(reason.contains("No space left on device"), "{reason}");
+        let n = client.metric("offbd_commit_failures_total").await;
+        failing_commits(client, n + 8.0).await;
+        store.execute(ROOM).await.unwrap();
+        client.readiness(200).await;
+        let found = failures(&process.log()[n_bytes..]);
+        assert_eq!(found.len(), 1, "{found:?}");
+    }
+    let after: Vec<i64> = sqlx::query_scalar(writers).fetch_all(&mut store).await.unwrap();
+    assert_eq!(before, after, "the connection of the writer and its locks are kept");
+    eventually(async || (client.session("a", "s").await["samples"] == 300).then_some(())).await;
+    assert_eq!(client.recording("a", "s").await, samples);
+}
+
+/// A stop does not wait for room.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_full_disk_does_not_hold_up_a_stop() {
+    let (server, data) = (Postgres::new(), tempfile::tempdir().unwrap());
+    let url = server.database("twin");
+    let mut process = Process::start_with(data.path(), &[("OFFBD_DATABASE", Path::new(&url))]);
+    process.client.asset("a").await;
+    connection(&url).await.execute(FULL).await.unwrap();
+    send(&process.client, &rig(100, 100));
+    process.client.readiness(503).await;
+    process.terminate();
+    let status = timeout(STOP_TIMEOUT, ended(&mut process.child)).await.expect("it ends in time");
+    assert!(status.success(), "{status}");
 }
 
 /// Passes connections on to the socket in `to`, and counts those for which nobody listens

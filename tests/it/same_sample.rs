@@ -162,6 +162,34 @@ async fn retransmissions_after_the_end_of_a_session_are_duplicates() {
     }
 }
 
+/// A device that starts anew sends again, late, what its first run has sent: older than what the
+/// engine of the second run remembers, and at times at which that has no sample.
+#[tokio::test]
+async fn retransmissions_of_an_earlier_run_are_duplicates_however_late() {
+    let fixture = service().await;
+    let client = &fixture.client;
+    let first = unnumbered(&rig(2000, usize::MAX));
+    let second: Vec<Sample> = shifted(unnumbered(&rig(1000, usize::MAX)))
+        .into_iter()
+        .map(|sample| Sample { t_s: sample.t_s + 0.003, ..sample })
+        .collect();
+    assert_eq!(send(client, None, &first).await, [2000, 0, 0, 0]);
+    let [accepted, duplicate, rejected, _] = send(client, None, &second).await;
+    assert_eq!([accepted, duplicate, rejected], [1000, 0, 0]);
+    let found = sessions(client).await;
+    assert_eq!(found.len(), 2);
+    let name = |i: usize| found[i]["name"].as_str().unwrap();
+    let ack = client.telemetry("a", None, &first[300..310]).await;
+    assert_eq!((&ack["accepted"], &ack["duplicate"]), (&json!(0), &json!(10)), "{ack}");
+    assert_eq!(ack["session"], name(1));
+    // What the second run sends again is still its own, and what is new is taken.
+    assert_eq!(send(client, None, &second[300..310]).await, [0, 10, 0, 0]);
+    let between = Sample { t_s: second[400].t_s + 0.002, ..second[400] };
+    assert_eq!(send(client, None, &[between]).await, [1, 0, 0, 1]);
+    assert_eq!(client.recording("a", name(1)).await, first);
+    assert_eq!(client.session("a", name(0)).await["samples"], 1001);
+}
+
 #[tokio::test]
 async fn retransmissions_are_recognised_however_old() {
     let mut fixture = service().await;

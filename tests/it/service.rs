@@ -138,6 +138,50 @@ async fn a_second_service_cannot_open_the_store() {
     assert!(error.contains("another process"), "{error}");
 }
 
+/// The lock is that of the file, and nobody else can read it.
+#[cfg(unix)]
+#[tokio::test]
+async fn two_stores_in_one_directory_do_not_lock_each_other() {
+    use std::os::unix::fs::PermissionsExt;
+    let data = tempfile::tempdir().unwrap();
+    let start = async |name: &str| {
+        let mut config =
+            offbd::config::Config { data: data.path().to_owned(), ..Default::default() };
+        config.database = Some(format!("sqlite:{}", data.path().join(name).display()));
+        config.listen.set_port(0);
+        offbd::server::start(config).await.unwrap()
+    };
+    let servers = [start("a.db").await, start("a.sqlite").await];
+    let lock = std::fs::metadata(data.path().join("a.db.lock")).unwrap();
+    assert_eq!(lock.permissions().mode() & 0o777, 0o600);
+    for server in servers {
+        server.shutdown().await.unwrap();
+    }
+}
+
+/// The store has no error to tell of then.
+#[tokio::test]
+async fn a_replay_of_a_session_that_is_deleted_meanwhile_is_not_stored() {
+    use offbd::store::{ChangeSet, Location, ReplayRow, Store, Write};
+    let data = tempfile::tempdir().unwrap();
+    let location = Location::of_url(&crate::support::url(data.path())).unwrap();
+    let (store, mut writer) = Store::open(&location).await.unwrap();
+    let replay = ReplayRow {
+        id: "replay".to_owned(),
+        session: "gone".to_owned(),
+        state: "queued".to_owned(),
+        settings: "{}".to_owned(),
+        created_at: 1,
+        finished_at: None,
+        result: None,
+        error: None,
+    };
+    let mut set = vec![Write::PutReplay(replay)];
+    writer.commit(&mut [ChangeSet::unpartitioned(&mut set)]).await.unwrap();
+    assert!(store.replay("replay").await.unwrap().is_none());
+    writer.close().await.unwrap();
+}
+
 #[tokio::test]
 async fn an_auxiliary_writer_can_write_while_the_service_runs() {
     use offbd::store::{ChangeSet, Location, Store, Write};

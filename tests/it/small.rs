@@ -271,7 +271,7 @@ async fn a_start_waits_a_little_for_the_lock_of_a_process_that_is_ending() {
         return;
     }
     let data = tempfile::tempdir().unwrap();
-    let lock = std::fs::File::create(data.path().join("offbd.lock")).unwrap();
+    let lock = std::fs::File::create(data.path().join("offbd.sqlite.lock")).unwrap();
     lock.lock().unwrap();
     let mut start = Box::pin(offbd::server::start(config(data.path())));
     assert!(futures_util::poll!(&mut start).is_pending(), "it is locked");

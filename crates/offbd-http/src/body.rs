@@ -70,6 +70,12 @@ impl BodyBudget {
 /// A request body and its permits of the [`BodyBudget`], released on drop.
 pub(super) struct BudgetedBody {
     pub(super) bytes: Vec<u8>,
+    reserved: ReservedBytes,
+}
+
+/// Bytes of the [`BodyBudget`], released on drop.
+#[derive(Debug, Default)]
+pub(super) struct ReservedBytes {
     /// Of the caller's share, if there is one, and of the whole budget.
     permits: Vec<OwnedSemaphorePermit>,
 }
@@ -92,7 +98,7 @@ pub(super) async fn read(
 }
 
 async fn collect(body: Body, limit: usize, share: &BodyShare) -> Result<BudgetedBody, Problem> {
-    let mut read = BudgetedBody { bytes: Vec::new(), permits: Vec::new() };
+    let mut read = BudgetedBody { bytes: Vec::new(), reserved: ReservedBytes::default() };
     let mut frames = body.into_data_stream();
     while let Some(frame) = frames.next().await {
         let frame = frame.map_err(|error| {
@@ -108,7 +114,7 @@ async fn collect(body: Body, limit: usize, share: &BodyShare) -> Result<Budgeted
                 detail,
             ));
         }
-        read.reserve(frame.len(), share)?;
+        read.reserved.add(frame.len(), share)?;
         read.bytes.extend_from_slice(&frame);
     }
     Ok(read)
@@ -120,8 +126,12 @@ impl AsRef<[u8]> for BudgetedBody {
     }
 }
 
-impl BudgetedBody {
-    fn reserve(&mut self, n: usize, share: &BodyShare) -> Result<(), Problem> {
+impl ReservedBytes {
+    /// Reserves `n` more bytes of the caller's share, if there is one, and of the whole budget.
+    ///
+    /// # Errors
+    /// [`ServiceError::Busy`] if one of them is exhausted.
+    pub(super) fn add(&mut self, n: usize, share: &BodyShare) -> Result<(), ServiceError> {
         for (i, permit) in share.reserve(n)?.into_iter().enumerate() {
             match self.permits.get_mut(i) {
                 Some(held) => held.merge(permit),
@@ -130,15 +140,21 @@ impl BudgetedBody {
         }
         Ok(())
     }
+
+    /// Releases `n` bytes, or all if there are fewer.
+    pub(super) fn release(&mut self, n: usize) {
+        for permit in &mut self.permits {
+            drop(permit.split(n.min(permit.num_permits())));
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.permits.iter().all(|permit| permit.num_permits() == 0)
+    }
 }
 
 impl BodyShare {
-    /// Reserves `n` bytes, until the permits are dropped: of the caller's share, if there is
-    /// one, and of the whole budget.
-    ///
-    /// # Errors
-    /// [`ServiceError::Busy`] if one of them is exhausted.
-    pub(super) fn reserve(&self, n: usize) -> Result<Vec<OwnedSemaphorePermit>, ServiceError> {
+    fn reserve(&self, n: usize) -> Result<Vec<OwnedSemaphorePermit>, ServiceError> {
         let n = u32::try_from(n).unwrap_or(u32::MAX);
         let reserve = |bytes: &Arc<Semaphore>| bytes.clone().try_acquire_many_owned(n);
         let permits: Result<_, _> = self.own.iter().chain([&self.all]).map(reserve).collect();

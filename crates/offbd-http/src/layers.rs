@@ -12,6 +12,7 @@ use axum::http::{HeaderName, StatusCode};
 use axum::middleware::{Next, from_fn};
 use axum::response::{IntoResponse, Response};
 use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::classify::ServerErrorsFailureClass;
 use tower_http::compression::CompressionLayer;
 use tower_http::request_id::{
     MakeRequestUuid, PropagateRequestIdLayer, RequestId, SetRequestIdLayer,
@@ -42,7 +43,7 @@ pub(super) fn add(router: Router, policy: &AccessPolicy) -> Router {
     router.layer((
         SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid),
         PropagateRequestIdLayer::new(REQUEST_ID),
-        TraceLayer::new_for_http().make_span_with(span),
+        TraceLayer::new_for_http().make_span_with(span).on_failure(failed),
         CompressionLayer::new(),
         headers::cors(&policy.origins),
         from_fn(headers::secure),
@@ -69,6 +70,17 @@ fn span(request: &Request<Body>) -> Span {
 /// Records the asset name in the request's span.
 pub(super) fn record_asset(asset: &str) {
     Span::current().record("asset", asset);
+}
+
+/// Logs a response that tells of an error of the service. One with 503 does not: why the store or
+/// an asset is away is logged once, where it is noticed.
+fn failed(failure: ServerErrorsFailureClass, latency: Duration, _: &Span) {
+    match failure {
+        ServerErrorsFailureClass::StatusCode(StatusCode::SERVICE_UNAVAILABLE) => {
+            tracing::debug!(?latency, "unavailable at present");
+        }
+        failure => tracing::error!(classification = %failure, ?latency, "response failed"),
+    }
 }
 
 fn request_id(request: &Request<Body>) -> Option<String> {

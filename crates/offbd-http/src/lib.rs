@@ -54,6 +54,7 @@ mod tokens;
 mod trace_parent;
 mod traces;
 mod trials;
+mod web_socket;
 
 use std::str::FromStr;
 use std::sync::Arc;

@@ -11,17 +11,19 @@ use std::time::Duration;
 
 use axum::Extension;
 use axum::extract::State;
-use axum::extract::ws::rejection::WebSocketUpgradeRejection;
-use axum::extract::ws::{CloseFrame, Message, WebSocket, WebSocketUpgrade, close_code};
 use axum::http::StatusCode;
 use axum::response::Response;
-use futures_util::{FutureExt, SinkExt};
+use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::{Deserialize, Serialize};
-use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval_at, timeout};
+use tokio_tungstenite::tungstenite::Error as SocketError;
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::protocol::CloseFrame;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use utoipa::ToSchema;
 
-use super::body::BodyShare;
+use super::body::{BodyShare, ReservedBytes};
+use super::web_socket::{WebSocket, WebSocketRequest};
 use super::{App, AssetPath, Problem, Query};
 use offbd_core::vocabulary::Invalid;
 use offbd_service::access::{Caller, Right};
@@ -42,10 +44,8 @@ const MAX_PENDING_ROWS: usize = 50_000;
 /// Longest time to send one frame; a slower client is disconnected.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Limit of bytes in the socket's write buffer.
-const MAX_WRITE_BUFFER: usize = 1 << 20;
-
-/// Interval between pings; a client that sends nothing for two intervals is disconnected.
+/// Interval between pings; a client that sends nothing for two intervals is disconnected, and
+/// one whose message is not complete after two.
 const PING_INTERVAL: Duration = Duration::from_secs(20);
 
 /// Highest rate of states, Hz; a higher requested rate is clamped.
@@ -87,8 +87,9 @@ pub(super) struct FrameView {
 /// sends JSON objects with a `type`: `ack` (once the batch is durable), `error` (with a
 /// `problem`), `fault` and, if requested, `state`. Sending batches requires the right
 /// `feed` for the asset; without it the stream is read-only. The stream is closed when
-/// the token expires or is revoked. In a cluster it is closed, with code 1012, when another
-/// node takes the asset over: connect again, to any node.
+/// the token expires or is revoked, and with code 1013 when messages of all streams and request
+/// bodies take too much memory: connect again later. In a cluster it is closed, with code 1012,
+/// when another node takes the asset over: connect again, to any node.
 #[utoipa::path(get, path = "/assets/{asset}/stream", tag = "telemetry",
     operation_id = "stream_telemetry",
     params(("asset" = String, description = "Name of the asset"), StreamQuery),
@@ -100,24 +101,16 @@ pub(super) async fn stream(
     Query(query): Query<StreamQuery>,
     Extension(caller): Extension<Caller>,
     share: Option<Extension<BodyShare>>,
-    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
+    upgrade: WebSocketRequest,
 ) -> Result<Response, Problem> {
-    let upgrade = upgrade.map_err(|rejection| {
-        let detail = format!("a WebSocket upgrade is required: {}", rejection.body_text());
-        Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Upgrade required", detail)
-    })?;
     let share = share.map_or_else(|| app.budget.whole(), |Extension(share)| share);
     let period = query.state.map(period).transpose()?;
     let states = RequestedStates { period, cursor: query.trace.then(TraceCursor::default) };
     let events = app.service.events(Some(asset.clone()), query.after).await?;
-    let frame = app.service.limits().requests.batch_bytes;
-    let upgrade = upgrade
-        .max_frame_size(frame)
-        .max_message_size(frame)
-        .max_write_buffer_size(MAX_WRITE_BUFFER);
-    Ok(upgrade.on_upgrade(move |socket| async move {
+    let longest = app.service.limits().requests.batch_bytes;
+    Ok(upgrade.accept(longest, share, move |socket| async move {
         metrics::gauge!("offbd_streams").increment(1.0);
-        let stream = StreamConnection::new(socket, app, caller, share, asset, events, states);
+        let stream = StreamConnection::new(socket, app, caller, asset, events, states);
         stream.run().await;
         metrics::gauge!("offbd_streams").decrement(1.0);
     }))
@@ -135,7 +128,9 @@ enum CloseReason {
     /// The client has disconnected or is too slow; no close frame is sent.
     Gone,
     /// The service closes the connection with this code and reason.
-    Close(u16, &'static str),
+    Close(CloseCode, &'static str),
+    /// Likewise, while the client may still send the rest of a message.
+    Refuse(CloseCode, &'static str),
 }
 
 /// A batch that is queued and not acknowledged yet.
@@ -151,7 +146,7 @@ struct QueuedBatch {
     n_rows: usize,
     submitted: ServiceFuture<PendingBatch>,
     /// The memory of its message.
-    _bytes: Vec<OwnedSemaphorePermit>,
+    _memory: ReservedBytes,
 }
 
 type ServiceFuture<T> = Pin<Box<dyn Future<Output = Result<T, ServiceError>> + Send>>;
@@ -183,8 +178,6 @@ struct StreamConnection {
     app: App,
     /// Whether the caller may send batches.
     may_send: bool,
-    /// The memory that messages may take.
-    share: BodyShare,
     /// Completes when the caller's token expires or is revoked.
     revoked: Pin<Box<dyn Future<Output = ()> + Send>>,
     /// Completes when another node owns the asset.
@@ -213,7 +206,7 @@ enum StreamEvent {
     Moved,
     Acknowledged(Result<AckView, ServiceError>),
     Submitted(Result<PendingBatch, ServiceError>),
-    Frame(Option<Result<Message, axum::Error>>),
+    Frame(Option<Result<Message, SocketError>>),
     Event(Result<Option<std::sync::Arc<Event>>, ServiceError>),
     State,
     Ping,
@@ -225,7 +218,6 @@ impl StreamConnection {
         socket: WebSocket,
         app: App,
         caller: Caller,
-        share: BodyShare,
         asset: String,
         events: EventFeed,
         states: RequestedStates,
@@ -247,7 +239,6 @@ impl StreamConnection {
             socket,
             app,
             may_send,
-            share,
             revoked,
             moved,
             asset,
@@ -269,9 +260,15 @@ impl StreamConnection {
                 break reason;
             }
         };
-        if let CloseReason::Close(code, reason) = reason {
+        let is_refused = matches!(reason, CloseReason::Refuse(..));
+        if let CloseReason::Close(code, reason) | CloseReason::Refuse(code, reason) = reason {
             let frame = CloseFrame { code, reason: reason.into() };
+            // The client may be gone.
             let _ = timeout(SEND_TIMEOUT, self.socket.send(Message::Close(Some(frame)))).await;
+        }
+        if is_refused {
+            // Without what the socket has read.
+            self.socket.into_inner().discard().await;
         }
     }
 
@@ -299,7 +296,7 @@ impl StreamConnection {
             event = events.next() => StreamEvent::Event(event),
             _ = pings.tick() => StreamEvent::Ping,
             _ = state => StreamEvent::State,
-            frame = socket.recv(), if !full => StreamEvent::Frame(frame),
+            frame = socket.next(), if !full => StreamEvent::Frame(frame),
         }
     }
 
@@ -313,14 +310,14 @@ impl StreamConnection {
     async fn handle(&mut self, event: StreamEvent) -> Result<(), CloseReason> {
         match event {
             StreamEvent::Closing => {
-                self.close(close_code::AWAY, "the service is shutting down").await
+                self.close(CloseCode::Away, "the service is shutting down").await
             }
             StreamEvent::Moved => {
                 let reason = "another node serves the asset now; connect again";
-                self.close(close_code::RESTART, reason).await
+                self.close(CloseCode::Restart, reason).await
             }
             StreamEvent::Revoked => {
-                Err(CloseReason::Close(close_code::POLICY, "the token has expired or was revoked"))
+                Err(CloseReason::Close(CloseCode::Policy, "the token has expired or was revoked"))
             }
             StreamEvent::Acknowledged(ack) => self.send_acks(ack).await,
             StreamEvent::Submitted(submitted) => {
@@ -334,10 +331,10 @@ impl StreamConnection {
             }
             StreamEvent::Event(Ok(Some(event))) => self.send_fault(&event).await,
             StreamEvent::Event(Ok(None)) => {
-                Err(CloseReason::Close(close_code::AWAY, "the service is shutting down"))
+                Err(CloseReason::Close(CloseCode::Away, "the service is shutting down"))
             }
             StreamEvent::Event(Err(_)) => {
-                Err(CloseReason::Close(close_code::ERROR, "the store failed"))
+                Err(CloseReason::Close(CloseCode::Error, "the store failed"))
             }
             StreamEvent::Ping => self.send_ping().await,
             StreamEvent::State => self.send_state().await,
@@ -345,7 +342,7 @@ impl StreamConnection {
             StreamEvent::Frame(Some(Err(error))) => {
                 tracing::debug!(%error, asset = self.asset, "the stream failed");
                 let (code, reason) = failure(&error);
-                Err(CloseReason::Close(code, reason))
+                Err(CloseReason::Refuse(code, reason))
             }
             StreamEvent::Frame(None) => Err(CloseReason::Gone),
         }
@@ -353,7 +350,7 @@ impl StreamConnection {
 
     /// Closes the connection when the service stops or the asset has moved: queued batches are
     /// still answered, one that waits for room is dropped.
-    async fn close(&mut self, code: u16, reason: &'static str) -> Result<(), CloseReason> {
+    async fn close(&mut self, code: CloseCode, reason: &'static str) -> Result<(), CloseReason> {
         self.waiting = None;
         while let Some(pending) = self.pending.pop_front() {
             let ack = pending.ack.await;
@@ -369,7 +366,12 @@ impl StreamConnection {
             Message::Text(text) => self.ingest(TelemetryFormat::Json, text.as_bytes()).await,
             Message::Binary(bytes) => self.ingest(TelemetryFormat::of_bytes(&bytes), &bytes).await,
             Message::Close(_) => Err(CloseReason::Gone),
-            Message::Ping(_) | Message::Pong(_) => Ok(()),
+            Message::Ping(content) | Message::Pong(content) => {
+                self.socket.get_mut().release_control(content.len());
+                Ok(())
+            }
+            // Only a frame that is sent.
+            Message::Frame(_) => Ok(()),
         }
     }
 
@@ -379,25 +381,23 @@ impl StreamConnection {
         format: TelemetryFormat,
         document: &[u8],
     ) -> Result<(), CloseReason> {
+        let memory = self.socket.get_mut().take_reserved();
         if !self.may_send {
             let detail = "the token does not permit sending telemetry of this asset";
             let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail);
             let refused = StreamErrorView { id: None, problem };
             return self.send_messages(vec![text(&StreamFrameView::Error(refused))]).await;
         }
-        let parsed = self.share.reserve(document.len()).and_then(|bytes| {
-            let batch = format.parse(document, self.app.service.limits().requests.batch_samples)?;
-            Ok((batch, bytes))
-        });
-        match parsed {
-            Ok((mut batch, bytes)) => {
+        let most = self.app.service.limits().requests.batch_samples;
+        match format.parse(document, most) {
+            Ok(mut batch) => {
                 let (id, n_rows) = (batch.id.take(), batch.rows.len());
                 let submitted = self.app.service.submit_when_ready(&self.asset, batch, false);
                 let submitted = Box::pin(submitted);
-                self.waiting = Some(QueuedBatch { id, n_rows, submitted, _bytes: bytes });
+                self.waiting = Some(QueuedBatch { id, n_rows, submitted, _memory: memory });
             }
             Err(error) => {
-                let ack = acknowledgement(Err(error));
+                let ack = acknowledgement(Err(error.into()));
                 self.pending.push_back(PendingAck { id: None, n_rows: 0, ack });
             }
         }
@@ -452,9 +452,12 @@ impl StreamConnection {
     async fn send_ping(&mut self) -> Result<(), CloseReason> {
         if self.received_at.elapsed() > 2 * PING_INTERVAL {
             return Err(CloseReason::Close(
-                close_code::POLICY,
+                CloseCode::Policy,
                 "the client did not answer the pings",
             ));
+        }
+        if self.socket.get_mut().begun_at().is_some_and(|at| at.elapsed() > 2 * PING_INTERVAL) {
+            return Err(CloseReason::Close(CloseCode::Policy, "the message was not completed"));
         }
         self.send_messages(vec![Message::Ping(axum::body::Bytes::new())]).await
     }
@@ -525,13 +528,14 @@ fn text(frame: &StreamFrameView) -> Message {
 }
 
 /// Returns the close code and the reason for a frame that could not be read (RFC 6455,
-/// section 7.4.1).
-fn failure(error: &axum::Error) -> (u16, &'static str) {
-    use tokio_tungstenite::tungstenite::Error;
-    let source = std::error::Error::source(error).and_then(|source| source.downcast_ref());
-    match source {
-        Some(Error::Capacity(_)) => (close_code::SIZE, "the message is too long"),
-        Some(Error::Utf8(_)) => (close_code::INVALID, "a text message is not UTF-8"),
-        _ => (close_code::PROTOCOL, "a malformed frame"),
+/// section 7.4.1, and the IANA registry).
+fn failure(error: &SocketError) -> (CloseCode, &'static str) {
+    match error {
+        SocketError::Capacity(_) => (CloseCode::Size, "the message is too long"),
+        SocketError::Utf8(_) => (CloseCode::Invalid, "a text message is not UTF-8"),
+        SocketError::Io(error) if error.kind() == std::io::ErrorKind::OutOfMemory => {
+            (CloseCode::Again, "messages take too much memory at present; connect again later")
+        }
+        _ => (CloseCode::Protocol, "a malformed frame"),
     }
 }

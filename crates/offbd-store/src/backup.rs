@@ -43,6 +43,7 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
 /// this version; then nothing is changed.
 pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<(), StoreError> {
     let file = location.file().ok_or(StoreError::NotSqlite)?;
+    check_regular(copy)?;
     if !replace {
         check_absent(file)?;
     }
@@ -109,11 +110,36 @@ async fn copy_rows(copy: &mut AnyConnection, file: &Path) -> Result<(), StoreErr
     Ok(())
 }
 
-/// Renames the finished `part` to `file`; contents and name are on the disk on return.
+/// Gives the finished `part` the name `file`; contents and name are on the disk on return.
+///
+/// # Errors
+/// [`StoreError::Exists`] if there is a file of this name meanwhile, which is kept.
 fn publish(part: &Path, file: &Path) -> Result<(), StoreError> {
+    use std::io::ErrorKind::{AlreadyExists, PermissionDenied, Unsupported};
     File::open(part).and_then(|file| file.sync_all()).map_err(file_error(part))?;
-    std::fs::rename(part, file).map_err(file_error(file))?;
+    // A second name, because renaming would replace the other file.
+    match std::fs::hard_link(part, file) {
+        Ok(()) => remove_if_exists(part)?,
+        Err(error) if error.kind() == AlreadyExists => {
+            return Err(StoreError::Exists { file: file.to_owned() });
+        }
+        // A file system without second names.
+        Err(error) if matches!(error.kind(), Unsupported | PermissionDenied) => {
+            check_absent(file)?;
+            std::fs::rename(part, file).map_err(file_error(file))?;
+        }
+        Err(error) => return Err(file_error(file)(error)),
+    }
     sync_directory_of(file)
+}
+
+/// Checks that `copy` is a file with an end, and not a device.
+fn check_regular(copy: &Path) -> Result<(), StoreError> {
+    let metadata = std::fs::metadata(copy).map_err(file_error(copy))?;
+    if metadata.is_file() {
+        return Ok(());
+    }
+    Err(file_error(copy)(std::io::Error::other("is not a regular file")))
 }
 
 fn check_absent(file: &Path) -> Result<(), StoreError> {
@@ -143,6 +169,33 @@ mod tests {
     use super::*;
     use crate::ChangeSet;
     use crate::{AssetRow, Store, Write};
+
+    /// A file that appears while the copy is made is somebody else's.
+    #[test]
+    fn a_file_that_has_appeared_is_not_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let (part, file) = (folder.path().join("copy.part"), folder.path().join("copy"));
+        std::fs::write(&part, "new").unwrap();
+        std::fs::write(&file, "theirs").unwrap();
+        assert!(matches!(publish(&part, &file), Err(StoreError::Exists { .. })));
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "theirs");
+        std::fs::remove_file(&file).unwrap();
+        publish(&part, &file).unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "new");
+        assert!(!part.exists());
+    }
+
+    /// A device has no end.
+    #[cfg(unix)]
+    #[tokio::test]
+    async fn only_a_regular_file_is_restored() {
+        let folder = tempfile::tempdir().unwrap();
+        let location = Location::File(folder.path().join("offbd.db"));
+        let restored = restore(&location, Path::new("/dev/zero"), false);
+        let restored = tokio::time::timeout(std::time::Duration::from_secs(60), restored).await;
+        let error = restored.expect("it ends").unwrap_err();
+        assert_eq!(error.to_string(), "/dev/zero: is not a regular file");
+    }
 
     /// More rows than the page cache of a connection holds.
     #[tokio::test]

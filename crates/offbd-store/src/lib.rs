@@ -62,6 +62,7 @@ use migrations::MIGRATIONS;
 use offbd_core::vocabulary::Sample;
 use sqlx::AnyPool;
 use sqlx::migrate::MigrateError;
+use sqlx::postgres::{PgDatabaseError, PgSeverity};
 
 pub use access::{AccessWrite, AuditRow, LAST_ID, MAX_LOGINS, TokenRow};
 pub use alarm::{AlarmWrite, CommunicationChange, CommunicationRow, MuteRow, NoteRow, OpenLink};
@@ -69,6 +70,7 @@ pub use asset_record::{AssetRecord, EndedSessionRow, MAX_ASSETS_AT_ONCE, MAX_END
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
 pub use expiry::SessionSize;
+pub use file::private_file;
 pub use location::Location;
 pub use notification::{
     ChannelRow, DeliveryRow, NotificationWrite, PlannedEventRow, ReminderRow, RuleRow,
@@ -214,6 +216,25 @@ impl StoreError {
     pub fn is_conflict(&self) -> bool {
         let Self::Database(sqlx::Error::Database(error)) = self else { return false };
         error.is_unique_violation() || error.is_foreign_key_violation()
+    }
+
+    /// Returns whether the disk of the database is full (PostgreSQL's `disk_full`, SQLite's 13).
+    /// A smaller change may still find room.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        let Self::Database(sqlx::Error::Database(error)) = self else { return false };
+        error.code().is_some_and(|code| code == "53100" || code == "13")
+    }
+
+    /// Returns whether PostgreSQL has answered a statement with it and another connection would not
+    /// help: the change is invalid, or the disk is full. Nothing of the transaction is committed,
+    /// and the connection and its locks remain.
+    #[must_use]
+    pub fn leaves_connection(&self) -> bool {
+        let Self::Database(sqlx::Error::Database(error)) = self else { return false };
+        let of_server = error.try_downcast_ref::<PgDatabaseError>();
+        of_server.is_some_and(|error| error.severity() == PgSeverity::Error)
+            && (self.is_full() || !self.is_outage())
     }
 
     /// The error of a query that takes too long.

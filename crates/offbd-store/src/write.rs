@@ -21,7 +21,7 @@ mod test_faults;
 #[cfg(feature = "commit-faults")]
 pub use test_faults::{CommitFault, CommitPoint, FaultPlan};
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -152,14 +152,14 @@ impl Writer {
     }
 
     /// Applies `sets` in order, in one transaction that is durable on return, and assigns
-    /// ids to their actions and transitions: consecutive ones, in the order of the commits of
+    /// ids to their actions and transitions: increasing ones, in the order of the commits of
     /// all writers of the database.
     ///
     /// # Errors
     /// [`StoreError`]. If [`StoreError::is_outage`], the transaction may nevertheless be
-    /// committed; [`Writer::reconnect`] returns whether it is. Otherwise nothing has been
-    /// applied; after [`StoreError::Overtaken`] the partitions that it names are no longer
-    /// owned, see [`Writer::lost`].
+    /// committed, unless [`Writer::is_connected`]; [`Writer::reconnect`] returns whether it is.
+    /// Otherwise nothing has been applied; after [`StoreError::Overtaken`] the partitions that it
+    /// names are no longer owned, see [`Writer::lost`].
     pub async fn commit(&mut self, sets: &mut [ChangeSet<'_>]) -> Result<(), StoreError> {
         self.transact(sets, None).await
     }
@@ -191,12 +191,32 @@ impl Writer {
                 match error {
                     // The transaction was rolled back, and the connection holds locks.
                     StoreError::Overtaken { partitions } => self.lose(partitions),
+                    error if error.leaves_connection() => self.roll_back().await,
                     // After another failure the connection may be in any state.
                     _ => self.disconnect(),
                 }
             }
         }
         result
+    }
+
+    /// Ends the transaction that the server has refused. The connection remains, and with it what
+    /// this writer owns.
+    async fn roll_back(&mut self) {
+        self.in_doubt = None;
+        let Some(connection) = &mut self.connection else { return };
+        // Sends the rollback that waits for the next statement.
+        let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()));
+        let rolled_back = tokio::time::timeout(COMMIT_TIMEOUT, connection.ping()).await;
+        if rolled_back.unwrap_or_else(late).is_err() {
+            self.disconnect();
+        }
+    }
+
+    /// Whether there is a connection, which may have failed meanwhile.
+    #[must_use]
+    pub const fn is_connected(&self) -> bool {
+        self.connection.is_some()
     }
 
     /// Copies the rest of SQLite's write-ahead log into the database file if the
@@ -347,7 +367,7 @@ impl Writer {
             journal: &self.journal,
             refused: &self.refused,
             changes: JournalChanges::default(),
-            pending: Vec::new(),
+            pending: BTreeMap::new(),
         };
         for ChangeSet { partition, writes } in sets {
             let partition = partition.unwrap_or_default();

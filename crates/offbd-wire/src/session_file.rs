@@ -247,10 +247,24 @@ pub enum SessionFileError {
 /// Runs a part of a library's reader, whose panic means that the file contradicts itself.
 #[cfg(any(feature = "parquet", feature = "mcap", feature = "xlsx"))]
 fn guarded<T>(format: SessionFormat, read: impl FnOnce() -> T) -> Result<T, SessionFileError> {
-    std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).map_err(|_| {
+    IS_GUARDED.set(true);
+    let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
+    IS_GUARDED.set(false);
+    read.map_err(|_| {
         let reason = "its contents contradict each other".to_owned();
         SessionFileError::Damaged { format, reason }
     })
+}
+
+thread_local! {
+    static IS_GUARDED: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
+/// Whether a panic of this thread means that a file is damaged, which its reader reports. A hook
+/// for panics has nothing to report then.
+#[must_use]
+pub fn is_guarded() -> bool {
+    IS_GUARDED.get()
 }
 
 /// Where in a file a row is, counted from 1; lines count the header.

@@ -202,6 +202,9 @@ pub enum SovdValueView {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct SovdRecordingsView {
     pub items: Vec<SovdRecordingView>,
+    /// Path of the service's own list of the older recordings; absent if all are listed.
+    #[serde(rename = "x-offbd-next", skip_serializing_if = "Option::is_none")]
+    pub next: Option<String>,
 }
 
 /// A recording.

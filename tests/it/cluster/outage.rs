@@ -2,9 +2,11 @@
 
 use sqlx::Executor;
 
-use crate::support::cluster::{Cluster, N_NODES};
+use crate::outage::{FULL, ROOM, failing_commits};
+use crate::support::cluster::{Cluster, N_NODES, NodeKind};
 use crate::support::connection;
 use crate::support::device::DeviceLoad;
+use crate::support::postgres::Postgres;
 
 /// Ends all connections but this one, or only those with which nodes write.
 const END: [&str; 2] = [
@@ -39,4 +41,32 @@ async fn a_restarted_database_server_loses_nothing_of_a_cluster() {
     load.link.wait_for_samples(50).await;
     load.stop().await;
     cluster.settled(N_NODES).await;
+}
+
+/// The connections of the writers and their locks are kept while samples find no room, so that no
+/// partition changes hands.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_full_disk_moves_no_partition() {
+    let cluster = Cluster::of(Postgres::new(), vec![NodeKind::default(); 2]).await;
+    let (url, clients) = (cluster.url(), cluster.clients());
+    let load = DeviceLoad::start(8, &clients[0], cluster.data.path(), Some(&url));
+    load.link.wait_for_samples(400).await;
+    let mut store = connection(&url).await;
+    let epochs = "SELECT CAST(SUM(epoch) AS BIGINT) FROM partition";
+    let before: i64 = sqlx::query_scalar(epochs).fetch_one(&mut store).await.unwrap();
+    store.execute(FULL).await.unwrap();
+    for client in &clients {
+        client.readiness(503).await;
+        let n = client.metric("offbd_commit_failures_total").await;
+        // Longer than the server leaves the connection of a node idle.
+        failing_commits(client, n + 10.0).await;
+    }
+    let after: i64 = sqlx::query_scalar(epochs).fetch_one(&mut store).await.unwrap();
+    assert_eq!(before, after);
+    store.execute(ROOM).await.unwrap();
+    for client in &clients {
+        client.readiness(200).await;
+    }
+    load.link.wait_for_samples(400).await;
+    load.stop().await;
 }

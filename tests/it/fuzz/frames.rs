@@ -1,51 +1,15 @@
 //! Fuzzing of the WebSocket: mutated frames, sent to a real service.
 
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
 use tokio::time::timeout;
 
 use super::mutation::InputPool;
 use super::{corpus, env_number};
+use crate::support::web_socket::{frame, open_websocket};
 use crate::support::{DEADLINE, ServiceFixture, batch, rig};
 
 /// Number of connections, unless FUZZ is set.
 const CONNECTIONS: usize = 60;
-
-/// Opens a connection and upgrades it to a WebSocket.
-async fn open_websocket(address: &str) -> TcpStream {
-    let mut socket = TcpStream::connect(address).await.unwrap();
-    let request = format!(
-        "GET /api/v1/assets/a/stream HTTP/1.1\r\nhost: {address}\r\nconnection: upgrade\r\n\
-         upgrade: websocket\r\nsec-websocket-version: 13\r\n\
-         sec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
-    );
-    socket.write_all(request.as_bytes()).await.unwrap();
-    let mut head = Vec::new();
-    while !head.ends_with(b"\r\n\r\n") {
-        head.push(socket.read_u8().await.unwrap());
-    }
-    assert!(head.starts_with(b"HTTP/1.1 101 "), "{}", String::from_utf8_lossy(&head));
-    socket
-}
-
-/// Returns the frame of a text with a masking key of zero.
-fn frame(text: &[u8]) -> Vec<u8> {
-    let mut frame = vec![0x81];
-    match u16::try_from(text.len()) {
-        Ok(n) if n < 126 => frame.push(0x80 | u8::try_from(n).unwrap()),
-        Ok(n) => {
-            frame.push(0x80 | 126);
-            frame.extend(n.to_be_bytes());
-        }
-        Err(_) => {
-            frame.push(0x80 | 127);
-            frame.extend((text.len() as u64).to_be_bytes());
-        }
-    }
-    frame.extend([0; 4]);
-    frame.extend(text);
-    frame
-}
 
 /// A close frame.
 const CLOSE: [u8; 6] = [0x88, 0x80, 0, 0, 0, 0];

@@ -253,6 +253,19 @@ int rename(const char *from, const char *to)
     return result;
 }
 
+/* A second name, of which the first one is removed next: a renaming. */
+int link(const char *from, const char *to)
+{
+    if (!is_below_folder(from))
+        return REAL(link)(from, to);
+    if (fails(RENAME))
+        return -1;
+    int result;
+    IN_ORDER(result = REAL(link)(from, to);
+             if (result == 0) put('r', from, 0, to, strlen(to)));
+    return result;
+}
+
 void *mmap64(void *address, size_t n, int protection, int flags, int fd, off64_t at)
 {
     char path[PATH_BYTES];

@@ -24,6 +24,7 @@ pub mod provider;
 pub mod proxy;
 pub mod receiver;
 pub mod statement_gate;
+pub mod web_socket;
 #[cfg(feature = "xlsx")]
 pub mod workbook;
 
@@ -218,11 +219,16 @@ impl Client {
         .await
     }
 
+    /// The value of the metric without labels that has this name.
+    pub async fn metric(&self, name: &str) -> f64 {
+        let metrics = self.get("/metrics").await.text;
+        let value = |line: &str| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok();
+        metrics.lines().find_map(value).unwrap()
+    }
+
     /// The resident memory of the process, bytes.
     pub async fn resident_bytes(&self) -> f64 {
-        let metrics = self.get("/metrics").await.text;
-        let line = metrics.lines().find(|line| line.starts_with("offbd_process_resident_bytes "));
-        line.unwrap().split(' ').nth(1).unwrap().parse().unwrap()
+        self.metric("offbd_process_resident_bytes").await
     }
 
     /// The number of samples that the service has evaluated again to load its assets.

@@ -38,7 +38,8 @@ pub(super) async fn categories(
     Ok(answer(&view, "SovdReferences", &query))
 }
 
-/// Lists the recordings of a rig, the latest 500, newest first.
+/// Lists the recordings of a rig, the latest 500, newest first. If there are older ones,
+/// `x-offbd-next` is the path of the next page of the service's own list.
 #[utoipa::path(get, path = "/v1/components/{asset}/bulk-data/recordings", tag = "sovd",
     operation_id = "sovd_recordings",
     params(("asset" = String, description = "Name of the asset"), SchemaQuery),
@@ -59,7 +60,13 @@ pub(super) async fn list(
         session: Box::new(session),
     };
     let items = page.items.into_iter().map(item).collect();
-    Ok(answer(&SovdRecordingsView { items }, "SovdRecordings", &query))
+    let next = page.next.map(|cursor| {
+        let mut query = form_urlencoded::Serializer::new(String::new());
+        query.append_pair("asset", &asset).append_pair("cursor", &cursor);
+        query.append_pair("limit", &MAX_PAGE.to_string());
+        format!("/api/v1/sessions?{}", query.finish())
+    });
+    Ok(answer(&SovdRecordingsView { items, next }, "SovdRecordings", &query))
 }
 
 /// Returns a recording: as CSV, or as `Accept` prefers as JSON rows, a Parquet file, an Arrow

@@ -56,8 +56,8 @@ impl EndedSession {
     }
 
     /// Whether `sample` may be recorded in this session, if `open` does not have it.
-    fn may_contain(&self, sample: &Sample, open: Option<&Engine>) -> bool {
-        if self.is_other_run && !open.is_none_or(|engine| engine.precedes(sample)) {
+    fn may_contain(&self, sample: &Sample, open: Option<OpenSamples<'_>>) -> bool {
+        if self.is_other_run && !open.is_none_or(|open| open.engine.precedes(sample)) {
             return false;
         }
         match sample.seq.and_then(|seq| i64::try_from(seq).ok()) {
@@ -68,8 +68,10 @@ impl EndedSession {
 
     /// Whether `sample` may be recorded in this session, or in one before it, and `open` does not
     /// have it.
-    pub(super) fn is_doubtful(&self, sample: &Sample, open: Option<&Engine>) -> bool {
-        self.may_contain(sample, open) && is_new(sample, open)
+    pub(super) fn is_doubtful(&self, sample: &Sample, open: Option<OpenSamples<'_>>) -> bool {
+        self.may_contain(sample, open)
+            && sample.t_s.is_finite()
+            && open.is_none_or(|open| open.recognise(sample) == Recognition::New)
     }
 
     /// Returns which of `samples`, each with its index in the batch, this session has already,
@@ -77,7 +79,7 @@ impl EndedSession {
     pub(super) fn search(
         &self,
         samples: &[(usize, Sample)],
-        open: Option<&Engine>,
+        open: Option<OpenSamples<'_>>,
         turn: &Turn<'_>,
     ) -> Result<Found, ServiceError> {
         let mut found = Found::default();
@@ -115,7 +117,16 @@ pub(super) struct Found {
     pub(super) conflicts: BTreeSet<usize>,
 }
 
-/// Whether the engine of the open session does not have `sample`.
-fn is_new(sample: &Sample, open: Option<&Engine>) -> bool {
-    sample.t_s.is_finite() && open.is_none_or(|engine| engine.recognise(sample) == Recognition::New)
+/// The samples of the open session: those that its engine remembers, and older ones that were
+/// looked up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OpenSamples<'a> {
+    pub(super) engine: &'a Engine,
+    pub(super) recorded: &'a RecordedSamples,
+}
+
+impl OpenSamples<'_> {
+    fn recognise(self, sample: &Sample) -> Recognition {
+        self.recorded.recognise(self.engine.recognise(sample), sample)
+    }
 }

@@ -92,8 +92,19 @@ impl Asset {
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
         self.continue_if_long(turn)?;
-        let samples = self.without_earlier_parts(samples, turn, ack)?;
-        self.record_in_open(&samples, turn, ack)
+        let mut recorded = self.unremembered(&samples, turn)?;
+        let samples = self.without_earlier_parts(samples, &recorded, turn, ack)?;
+        self.record(&samples, &mut recorded, turn, ack)
+    }
+
+    /// Looks up those of `samples` that the engine of the open session does not remember.
+    fn unremembered(
+        &self,
+        samples: &[(usize, Sample)],
+        turn: &Turn<'_>,
+    ) -> Result<RecordedSamples, ServiceError> {
+        let Some(open) = &self.open else { return Ok(RecordedSamples::default()) };
+        RecordedSamples::unremembered(open, samples, turn)
     }
 
     /// Records samples of the open session.
@@ -103,8 +114,7 @@ impl Asset {
         turn: &mut Turn<'_>,
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
-        let Some(open) = &self.open else { return Ok(()) };
-        let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
+        let mut recorded = self.unremembered(samples, turn)?;
         self.record(samples, &mut recorded, turn, ack)
     }
 
@@ -117,7 +127,8 @@ impl Asset {
         ack: &mut AckView,
     ) -> Result<(), ServiceError> {
         self.continue_if_long(turn)?;
-        let samples = &self.without_sent_before(samples, turn, ack)?[..];
+        let mut recorded = self.unremembered(&samples, turn)?;
+        let samples = &self.without_sent_before(samples, &recorded, turn, ack)?[..];
         if samples.is_empty() {
             return Ok(());
         }
@@ -125,7 +136,6 @@ impl Asset {
             self.open_nameless(turn)?;
             return self.record_in_open(samples, turn, ack);
         };
-        let mut recorded = RecordedSamples::unremembered(open, samples, turn)?;
         // At most as often as sessions may begin; otherwise conflicts are rejected.
         let n_continued = match self.session_rate.allows(turn.at) {
             true => open.continued_by(samples, &recorded),

@@ -2,8 +2,9 @@
 //! another: it must not be recorded a second time, in the next session.
 
 use super::actor::Asset;
-use super::ended_session::EndedSession;
+use super::ended_session::{EndedSession, OpenSamples};
 use super::outcomes::count_unjudged;
+use super::recorded::RecordedSamples;
 use super::restart::CERTAIN_AFTER;
 use super::session::OpenSession;
 use super::turn::Turn;
@@ -22,16 +23,19 @@ impl Asset {
     }
 
     /// Returns `samples`, each with its index in the batch, without those that an ended
-    /// session has already, which are counted as duplicates.
+    /// session has already, which are counted as duplicates. `recorded` are those of the open
+    /// session that its engine does not remember.
     pub(super) fn without_sent_before(
         &mut self,
         mut samples: Vec<(usize, Sample)>,
+        recorded: &RecordedSamples,
         turn: &Turn<'_>,
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
         let engine = self.open.as_ref().map(|open| open.judging.engine());
+        let open = engine.map(|engine| OpenSamples { engine, recorded });
         for session in &mut self.ended {
-            let found = session.search(&samples, engine, turn)?;
+            let found = session.search(&samples, open, turn)?;
             session.acknowledge(&found, ack);
             session.is_same_run |= !found.same.is_empty();
             session.is_other_run |= found.conflicts.len() >= CERTAIN_AFTER as usize;
@@ -44,9 +48,11 @@ impl Asset {
     /// Returns `samples`, each with its index in the batch, without those that an earlier part
     /// of the open session has: with the same values, they are counted as duplicates; with
     /// others, they are rejected, as are those that parts may have that are not searched.
+    /// `recorded` is as above.
     pub(super) fn without_earlier_parts(
         &mut self,
         mut samples: Vec<(usize, Sample)>,
+        recorded: &RecordedSamples,
         turn: &Turn<'_>,
         ack: &mut AckView,
     ) -> Result<Vec<(usize, Sample)>, ServiceError> {
@@ -61,8 +67,8 @@ impl Asset {
         let parts: Vec<_> =
             self.ended.iter().filter(|ended| ended.first_part == open.part.first).collect();
         for part in &parts {
-            let engine = open.judging.engine();
-            let found = part.search(&samples, Some(engine), turn)?;
+            let known = OpenSamples { engine: open.judging.engine(), recorded };
+            let found = part.search(&samples, Some(known), turn)?;
             part.acknowledge(&found, ack);
             samples.retain(|(index, sample)| {
                 if found.conflicts.contains(index) {
@@ -76,8 +82,8 @@ impl Asset {
             && open.part.number > i64::from(MAX_ENDED_SESSIONS) + 1;
         if let Some(oldest) = parts.last().filter(|_| are_left_out) {
             samples.retain(|(index, sample)| {
-                let engine = open.judging.engine();
-                let is_doubtful = oldest.is_doubtful(sample, Some(engine));
+                let known = OpenSamples { engine: open.judging.engine(), recorded };
+                let is_doubtful = oldest.is_doubtful(sample, Some(known));
                 if is_doubtful {
                     reject(open, *index, Rejection::TooOld, ack);
                 }

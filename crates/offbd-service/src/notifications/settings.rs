@@ -96,6 +96,10 @@ fn check_url(url: &str, targets: &TargetPolicy) -> Result<(), String> {
         return Err("contains a user or password, which is not supported".to_owned());
     }
     let host = parsed.host().filter(|host| !host.is_empty()).ok_or("has no host")?;
+    let is_port_given = parsed.authority().is_some_and(|authority| authority.as_str() != host);
+    if is_port_given && parsed.port_u16().is_none_or(|port| port == 0) {
+        return Err("has a port that is not from 1 to 65535".to_owned());
+    }
     targets.check_host(host).map_err(|reason| format!("the host {reason}"))
 }
 
@@ -143,10 +147,17 @@ fn email(
         address(&format!("/email/to/{i}"), to)?;
     }
     let known = match before {
-        Some(StoredChannel::Email(before)) if before.user == user => before.password.clone(),
+        Some(StoredChannel::Email(before)) if before.user == user => before.password.as_ref(),
         _ => None,
     };
-    let password = password.or(known);
+    let is_same_server = matches!(before, Some(StoredChannel::Email(before))
+        if (&before.host, before.port, before.security) == (&host, port, security));
+    if known.is_some() && password.is_none() && !is_same_server {
+        // It is for the server that it was given for.
+        let reason = "give it again: the stored one is for another host, port or security";
+        return Err(Invalid::new("/email/password", reason).into());
+    }
+    let password = password.or(known.cloned());
     for (pointer, word) in [("/email/user", &user), ("/email/password", &password)] {
         word.as_deref().map_or(Ok(()), |word| text(pointer, word, MAX_MAIL_WORD))?;
     }

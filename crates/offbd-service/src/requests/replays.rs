@@ -36,13 +36,11 @@ impl Service {
             result: None,
             error: None,
         };
-        if let Err(error) =
-            self.inner.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await
-        {
-            // The session may have been deleted meanwhile.
-            self.session_asset(&row.session).await?;
-            return Err(error);
-        }
+        let stored =
+            self.inner.handles.write(&session.asset, vec![Write::PutReplay(row.clone())]).await;
+        // The session may have been deleted meanwhile, and the replay was not stored then.
+        self.session_asset(&row.session).await?;
+        stored?;
         let (job, cost) =
             (Job::Replay(row.id.clone()), job::replay_cost(session.progress.n_samples));
         room.put(NewJob { job, asset: session.asset, cost });

@@ -24,6 +24,10 @@ const MAX_GROUP_SETS: usize = 512;
 pub(crate) const FIRST_RETRY: Duration = Duration::from_millis(50);
 const RETRY_LONGEST: Duration = Duration::from_secs(2);
 
+/// Longest delay before changes are tried again for which the disk had no room. Chosen: shorter
+/// than the idle time after which PostgreSQL ends the connection of a node.
+const ROOM_RETRY_LONGEST: Duration = Duration::from_millis(500);
+
 /// How often a group of write sets may fail while the database accepts other changes.
 /// After that each set is tried alone, and a set that fails alone as often is refused. Two
 /// losses of the connection in a row may be a coincidence, three with the same changes
@@ -189,7 +193,7 @@ impl Committer {
         }
     }
 
-    /// Answers a request. If the database has failed, waits until it is available.
+    /// Answers a request. If the connection has failed, waits until the database is available.
     async fn answer<T>(
         &mut self,
         result: Result<T, StoreError>,
@@ -200,7 +204,8 @@ impl Committer {
             let _ = answer.send(result.map_err(ServiceError::from));
             return true;
         };
-        let is_available = !matches!(self.recover(&error).await, Recovery::Closing);
+        let is_available = error.leaves_connection() && self.writer.is_connected()
+            || !matches!(self.recover(&error).await, Recovery::Closing);
         let _ = answer.send(Err(error.into()));
         is_available
     }
@@ -228,11 +233,25 @@ impl Committer {
     /// Folds the journal into the recordings if it is too long. Only the next group waits
     /// for it. Returns whether the writer can continue.
     async fn fold(&mut self) -> bool {
-        let folding = self.writer.fold(self.journal_bytes);
-        let Some(folded) = unless_closing(&self.closing, folding).await else { return false };
-        metrics::gauge!("offbd_journal_bytes").set(self.writer.journal_bytes() as f64);
-        let Err(error) = folded else { return true };
-        metrics::counter!("offbd_commit_failures_total").increment(1);
+        let mut n_full = 0;
+        let error = loop {
+            let folding = self.writer.fold(self.journal_bytes);
+            let Some(folded) = unless_closing(&self.closing, folding).await else { return false };
+            metrics::gauge!("offbd_journal_bytes").set(self.writer.journal_bytes() as f64);
+            let Err(error) = folded else {
+                self.note_room(n_full);
+                return true;
+            };
+            metrics::counter!("offbd_commit_failures_total").increment(1);
+            if !error.is_full() {
+                self.note_room(n_full);
+                break error;
+            }
+            n_full += 1;
+            if matches!(self.await_room(&error, n_full).await, Recovery::Closing) {
+                return false;
+            }
+        };
         if error.is_outage() {
             return !matches!(self.recover(&error).await, Recovery::Closing);
         }
@@ -319,12 +338,23 @@ impl Committer {
             return Ok(());
         }
         metrics::histogram!("offbd_commit_sets").record(sets.len() as f64);
-        for n_failed in 1.. {
+        let (mut n_failed, mut n_full) = (0, 0);
+        loop {
             let Err(error) = self.attempt(&mut sets).await? else { break };
             if let StoreError::Overtaken { partitions } = error {
+                self.note_room(n_full);
                 return Err(CommitFailure::Overtaken(partitions));
             }
             metrics::counter!("offbd_commit_failures_total").increment(1);
+            if error.is_full() {
+                n_full += 1;
+                match self.await_room(&error, n_full).await {
+                    Recovery::Committed => break,
+                    Recovery::NotCommitted => continue,
+                    Recovery::Closing => return Err(CommitFailure::Closing),
+                }
+            }
+            n_failed += 1;
             if error.is_outage() {
                 match self.recover(&error).await {
                     Recovery::Committed => break,
@@ -335,6 +365,7 @@ impl Committer {
             }
             tracing::error!(%error, sets = sets.len(), n_failed, "commit failed");
             if !error.is_damage() {
+                self.note_room(n_full);
                 return Err(CommitFailure::Rejected);
             }
             if !self.is_committed_after_damage().await? {
@@ -380,6 +411,49 @@ impl Committer {
 
     /// Waits after `error` until the database is available or the service shuts down.
     async fn recover(&mut self, error: &StoreError) -> Recovery {
+        let recovered = self.wait_for_database(error).await;
+        if !matches!(recovered, Recovery::Closing) {
+            self.set_available();
+        }
+        recovered
+    }
+
+    /// Waits after the failure `n_full` of changes for which the disk has no room. Only when they
+    /// succeed is it known that there is room: what else is written may be smaller.
+    async fn await_room(&mut self, error: &StoreError, n_full: u32) -> Recovery {
+        self.set_unavailable(error);
+        if self.closing.is_cancelled() {
+            return Recovery::Closing;
+        }
+        let wait = self.first_retry.saturating_mul(1 << n_full.min(10)).min(ROOM_RETRY_LONGEST);
+        let (closing, mut waited) = (self.closing.clone(), Box::pin(tokio::time::sleep(wait)));
+        loop {
+            // Another node sees by these requests that this one is alive.
+            let request = tokio::select! {
+                biased;
+                () = closing.cancelled() => break,
+                () = &mut waited => break,
+                Some(request) = self.transfers.recv() => request,
+            };
+            if !self.transfer(request).await {
+                return Recovery::Closing;
+            }
+            self.note_lost();
+        }
+        if self.writer.is_connected() {
+            return Recovery::NotCommitted;
+        }
+        self.wait_for_database(error).await
+    }
+
+    /// Publishes that the database is available, if changes had no room meanwhile.
+    fn note_room(&mut self, n_full: u32) {
+        if n_full > 0 {
+            self.set_available();
+        }
+    }
+
+    async fn wait_for_database(&mut self, error: &StoreError) -> Recovery {
         self.writer.disconnect();
         self.set_unavailable(error);
         let closing = self.closing.clone();
@@ -390,18 +464,15 @@ impl Committer {
         }
     }
 
-    /// Waits until the database is available; returns whether the last commit has
-    /// succeeded after all.
+    /// Waits until there is a connection; returns whether the last commit has succeeded after
+    /// all.
     async fn reconnect(&mut self) -> bool {
         let mut wait = self.first_retry;
         loop {
             tokio::time::sleep(wait).await;
             wait = (wait * 2).min(RETRY_LONGEST);
             match self.writer.reconnect().await {
-                Ok(committed) => {
-                    self.set_available();
-                    return committed;
-                }
+                Ok(committed) => return committed,
                 Err(error) => self.set_unavailable(&error),
             }
             self.note_lost();

@@ -1,6 +1,6 @@
 //! A group of changes while its transaction is open.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use sqlx::AnyConnection;
 
@@ -55,9 +55,9 @@ pub(super) struct GroupCommit<'a> {
     pub(super) journal: &'a Journal,
     pub(super) refused: &'a HashSet<String>,
     pub(super) changes: JournalChanges,
-    /// New samples, one run per session. They are written at the end of the group, so that
-    /// consecutive batches of a session become one run.
-    pub(super) pending: Vec<Run>,
+    /// New samples, one run per session, by its id. They are written at the end of the group, so
+    /// that consecutive batches of a session become one run.
+    pub(super) pending: BTreeMap<String, Run>,
 }
 
 impl GroupCommit<'_> {
@@ -75,14 +75,14 @@ impl GroupCommit<'_> {
         samples: &[Sample],
         progress: SessionProgress,
     ) {
-        let known = self.pending.iter_mut().find(|p| p.session == session);
-        if let Some(pending) = known {
+        if let Some(pending) = self.pending.get_mut(session) {
             pending.samples.extend_from_slice(samples);
             pending.progress = progress;
             return;
         }
         let (session, samples) = (session.to_owned(), samples.to_vec());
-        self.pending.push(Run { partition, session, first_index, samples, progress });
+        let run = Run { partition, session: session.clone(), first_index, samples, progress };
+        self.pending.insert(session, run);
     }
 }
 
@@ -115,8 +115,7 @@ impl GroupCommit<'_> {
     /// Takes the samples of `session` in the journal and in this group, as one run.
     fn take_run(&mut self, session: &str) -> Result<Option<Run>, StoreError> {
         let in_journal = self.journal.run(session)?;
-        let at = self.pending.iter().position(|run| run.session == session);
-        let new = at.map(|at| self.pending.swap_remove(at));
+        let new = self.pending.remove(session);
         Ok(match (in_journal, new) {
             (Some(in_journal), Some(new)) => Some(in_journal.followed_by(new)),
             (in_journal, new) => in_journal.or(new),
@@ -125,7 +124,7 @@ impl GroupCommit<'_> {
 
     /// Drops the samples of `session`, which is deleted.
     pub(super) fn discard(&mut self, session: &str) {
-        self.pending.retain(|run| run.session != session);
+        self.pending.remove(session);
         self.tails.remove(session);
         self.changes.removed_sessions.insert(session.to_owned());
     }
@@ -149,14 +148,14 @@ impl GroupCommit<'_> {
     /// and appends all others to the journal.
     pub(super) async fn flush(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
         let at_once = |run: &Run| self.refused.contains(&run.session) || self.journal.is_large(run);
-        let folded: Vec<_> =
-            self.pending.iter().filter(|run| at_once(run)).map(|run| run.session.clone()).collect();
+        let folded = self.pending.values().filter(|run| at_once(run));
+        let folded: Vec<_> = folded.map(|run| run.session.clone()).collect();
         self.fold(db, &folded).await?;
         self.append(db).await
     }
 
     async fn append(&mut self, db: &mut AnyConnection) -> Result<(), StoreError> {
-        let runs = std::mem::take(&mut self.pending);
+        let runs = std::mem::take(&mut self.pending).into_values().collect();
         let mut changes = std::mem::take(&mut self.changes);
         let appended = Journal::append(db, runs, |p| self.journal_row(p), &mut changes).await;
         self.changes = changes;
@@ -191,7 +190,7 @@ impl GroupCommit<'_> {
             Destination::JournalEnd => {
                 for session in &relocation.sessions {
                     let run = self.take_run(session)?;
-                    self.pending.extend(run);
+                    self.pending.extend(run.map(|run| (run.session.clone(), run)));
                     self.changes.removed_sessions.insert(session.clone());
                 }
                 self.append(db).await?;

@@ -366,7 +366,17 @@ impl Writer {
             return Err(sqlx::Error::PoolClosed.into());
         };
         let taken = within(COMMIT_TIMEOUT, self.take_on(&mut connection, partitions)).await;
-        if taken.is_ok() {
+        let is_usable = match &taken {
+            Ok(_) => true,
+            Err(error) if error.leaves_connection() && self.role == WriterRole::Node => {
+                let is_foreign = |partition: &PartitionId| !self.owned.contains(*partition);
+                let foreign: Vec<_> = partitions.iter().copied().filter(is_foreign).collect();
+                // Only warns of locks that it has not got.
+                within(COMMIT_TIMEOUT, unlock(&mut connection, &foreign)).await.is_ok()
+            }
+            Err(_) => false,
+        };
+        if is_usable {
             self.connection = Some(connection);
         }
         taken

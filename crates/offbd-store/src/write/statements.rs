@@ -106,7 +106,12 @@ pub(super) async fn insert_trend(db: &mut AnyConnection, row: &TrendRow) -> Resu
     )
 }
 
+/// Stores a replay, unless its session has been deleted.
 pub(super) async fn put_replay(db: &mut AnyConnection, row: &ReplayRow) -> Result<(), StoreError> {
+    let session = sqlx::query("SELECT 1 FROM session WHERE id = $1").bind(&row.session);
+    if session.fetch_optional(&mut *db).await?.is_none() {
+        return Ok(());
+    }
     execute!(
         db, "INSERT INTO replay (id, session, state, settings, created_at, finished_at, result,
          error) VALUES ($1, $2, $3, $4, $5, $6, $7, $8)

@@ -89,10 +89,12 @@ fn sample(cells: SampleCells, has_unknown: bool) -> Result<Sample, String> {
     Ok(sample)
 }
 
-/// A row of a batch: an object, or a value of another type, with its name.
+/// A row of a batch: an object, one with a key twice, or a value of another type, with its name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum BatchRow {
     Object(SampleCells),
+    /// Of the two values one would be lost.
+    Repeated(&'static str),
     Other(&'static str),
 }
 
@@ -100,6 +102,7 @@ impl BatchRow {
     pub(super) fn sample(self, has_unknown: bool) -> Result<Sample, String> {
         match self {
             Self::Object(cells) => sample(cells, has_unknown),
+            Self::Repeated(key) => Err(format!("has the key `{key}` twice")),
             Self::Other(what) => Err(format!("the row is {what}, not an object")),
         }
     }
@@ -536,14 +539,19 @@ impl<'de> Visitor<'de> for BatchRowSeed<'_> {
     }
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<BatchRow, A::Error> {
         let mut cells = SampleCells::default();
+        let mut repeated = None;
         let keys = BatchKeySeed { unknown: self.0, is_row: true };
         while let Some(key) = map.next_key_seed(keys)? {
             match key {
+                BatchKey::Field(field) if cells[field] != Cell::Missing => {
+                    repeated = Some(FIELDS[field]);
+                    map.next_value::<IgnoredAny>()?;
+                }
                 BatchKey::Field(field) => cells[field] = map.next_value()?,
                 _ => drop(map.next_value::<IgnoredAny>()?),
             }
         }
-        Ok(BatchRow::Object(cells))
+        Ok(repeated.map_or(BatchRow::Object(cells), BatchRow::Repeated))
     }
     visit_unexpected!(BatchRow::Other);
 }

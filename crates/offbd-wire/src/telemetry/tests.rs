@@ -305,3 +305,14 @@ fn hostile_msgpack_is_rejected_with_the_pointer_of_the_error() {
     assert_eq!(refused(&[0x81, 0x07, 0xc0]).0, "/7", "a key that is not a string");
     assert!(refused(&[0x80, 0xc0]).1.contains("1 bytes follow"));
 }
+
+#[test]
+fn a_row_with_a_key_twice_is_invalid() {
+    let document = br#"{"samples":[{"t_s":0,"x_m":0.1,"x_m":0.2},{"t_s":1,"t_s":null},
+        {"t_s":2,"x_m":0.3,"other":1,"other":2}]}"#;
+    let rows = json(document, 9).unwrap().rows;
+    assert_eq!(rows[0], Err("has the key `x_m` twice".to_owned()));
+    assert_eq!(rows[1], Err("has the key `t_s` twice".to_owned()));
+    assert_eq!(rows[2].as_ref().map(|sample| sample.x_m), Ok(Some(0.3)));
+    assert_eq!(json_row(br#"{"t_s":0,"t_s":0}"#), Err("has the key `t_s` twice".to_owned()));
+}
