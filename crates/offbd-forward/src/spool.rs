@@ -214,8 +214,15 @@ impl Spool {
 
     /// Returns the assets of which batches wait, in the order of their oldest batch.
     pub(super) async fn assets(&self) -> Result<Vec<String>, SpoolError> {
-        let select =
-            "SELECT asset FROM batch WHERE refusal IS NULL GROUP BY asset ORDER BY MIN(id)";
+        // Seeks each asset in the index, instead of reading an entry for each batch.
+        let select = "WITH RECURSIVE waits(asset, id) AS (
+                SELECT * FROM (SELECT asset, id FROM batch
+                    WHERE refusal IS NULL ORDER BY asset, id LIMIT 1)
+                UNION ALL
+                SELECT next.asset, next.id FROM waits JOIN batch AS next ON next.id = (
+                    SELECT id FROM batch WHERE refusal IS NULL AND asset > waits.asset
+                    ORDER BY asset, id LIMIT 1))
+            SELECT asset FROM waits ORDER BY id";
         let mut file = self.file.lock().await;
         Ok(sqlx::query_scalar(select).fetch_all(&mut file.connection).await?)
     }
