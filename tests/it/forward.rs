@@ -3,6 +3,8 @@
 mod answers;
 #[cfg(target_os = "linux")]
 mod failing_disk;
+#[cfg(unix)]
+mod files;
 mod set_aside;
 
 use std::io::{BufRead, BufReader, Write};

@@ -11,6 +11,7 @@ mod answer;
 pub mod command;
 mod delays;
 mod delivery;
+mod files;
 mod intake;
 mod lines;
 mod refusal;

@@ -33,6 +33,10 @@ pub enum SpoolError {
     /// Nothing was changed.
     #[error("no batch {0} is set aside")]
     NotSetAside(i64),
+    #[error("the spool has the format {0} of a later version of offbd; this one knows {VERSION}")]
+    Later(i64),
+    #[error("the spool cannot be used: {0}")]
+    File(#[from] std::io::Error),
     #[error("the spool cannot be used: {0}")]
     Sql(#[from] sqlx::Error),
 }
@@ -150,7 +154,11 @@ impl SpoolFile {
 const VACUUM: &str = "PRAGMA incremental_vacuum(256)";
 const CHECKPOINT: &str = "PRAGMA wal_checkpoint(RESTART)";
 
+/// Version of the format, `PRAGMA user_version` of the file.
+const VERSION: i64 = 1;
+
 const SCHEMA: &str = "
+    PRAGMA user_version = 1;
     CREATE TABLE IF NOT EXISTS batch (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         asset TEXT NOT NULL,
@@ -165,17 +173,23 @@ impl Spool {
     /// Opens the spool at `path`, or creates it. Batches of up to `limit_bytes` fit.
     ///
     /// # Errors
-    /// [`SpoolError::Sql`] if the file cannot be used, or another process uses it.
+    /// [`SpoolError`] if the file cannot be used, another process uses it, or a later version of
+    /// offbd has written it.
     pub async fn open(path: &Path, limit_bytes: u64) -> Result<Self, SpoolError> {
+        super::files::prepare(path)?;
         let options = SqliteConnectOptions::new()
             .filename(path)
-            .create_if_missing(true)
             .locking_mode(SqliteLockingMode::Exclusive)
             .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
             // A commit is on the disk before it returns, also after a power cut.
             .synchronous(SqliteSynchronous::Full);
         let mut connection = options.connect().await.map_err(open_error)?;
+        let version = sqlx::query_scalar("PRAGMA user_version").fetch_one(&mut connection);
+        let version: i64 = version.await.map_err(open_error)?;
+        if version > VERSION {
+            return Err(SpoolError::Later(version));
+        }
         sqlx::raw_sql(SCHEMA).execute(&mut connection).await.map_err(open_error)?;
         let used_bytes = used_bytes(&mut connection).await?;
         let mut reserve = Reserve::of(path);
