@@ -213,16 +213,18 @@ impl Spool {
         if !file.reserve.is_kept() {
             return Err(SpoolError::NoReserve);
         }
-        let insert = "INSERT INTO batch (asset, query, media_type, body) VALUES ($1, $2, $3, $4)";
-        sqlx::query(insert)
-            .bind(&batch.asset)
-            .bind(&batch.query)
-            .bind(&batch.media_type)
-            .bind(&batch.body)
-            .execute(&mut file.connection)
-            .await?;
+        insert(&mut file.connection, batch).await?;
         file.used_bytes += bytes;
         self.added.notify_one();
+        Ok(())
+    }
+
+    /// Adds a batch beyond the limit, if need be in the room of the reserve: what the agent has
+    /// read when it is told to stop.
+    pub(super) async fn put_last(&self, batch: &NewBatch) -> Result<(), SpoolError> {
+        let mut file = self.file.lock().await;
+        file.change(async |connection| insert(connection, batch).await).await?;
+        file.used_bytes += cost(&batch.body);
         Ok(())
     }
 
@@ -381,6 +383,13 @@ impl Spool {
             refused,
         })
     }
+}
+
+async fn insert(connection: &mut SqliteConnection, batch: &NewBatch) -> Result<(), SpoolError> {
+    let insert = "INSERT INTO batch (asset, query, media_type, body) VALUES ($1, $2, $3, $4)";
+    let insert = sqlx::query(insert).bind(&batch.asset).bind(&batch.query);
+    insert.bind(&batch.media_type).bind(&batch.body).execute(connection).await?;
+    Ok(())
 }
 
 /// Returns what is set aside, up to `limit` batches, the oldest first.
