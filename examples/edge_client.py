@@ -7,12 +7,15 @@
 Uses only Python's standard library. Rows are numbered and sent in batches. A batch
 is retried with growing delays until the service acknowledges that it is stored; a
 sample that arrives twice is stored once. So no row is lost or duplicated, whatever
-happens to the connection. The rows are CSV with the header
+happens to the connection. A batch that the service refuses for good is reported, and
+the exit status is 1. If the session has ended, the next rows go to another one,
+SESSION-2 and so on. The rows are CSV with the header
 t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m (and `seq`, if the device numbers its rows).
 """
 
 import argparse
 import csv
+import http.client
 import json
 import queue
 import random
@@ -27,6 +30,18 @@ COLUMNS = ("t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m")
 MAX_DELAY_S = 30.0
 TIMEOUT_S = 30.0
 HEADERS = {"Content-Type": "application/json"}
+# With these the service refuses a batch for good. Everything else may pass, also an asset or a
+# token that is missing, and what a proxy answers.
+FINAL = (400, 409, 413, 415, 422)
+PROBLEM_TYPE = "urn:offbd:problem:"
+
+
+class Refused(Exception):
+    """The service has refused a request for good."""
+
+    def __init__(self, status, problem):
+        super().__init__(f"{status}: {problem.get('detail') or problem.get('title')}")
+        self.session_ended = problem["type"] == PROBLEM_TYPE + "session-ended"
 
 
 def main():
@@ -37,21 +52,49 @@ def main():
     base = f"{args.url}/api/v1/assets/{urllib.parse.quote(args.asset)}"
     if args.register:
         with open(args.register, "rb") as file:
-            deliver("PUT", base, file.read())
-    session = args.session or time.strftime("edge-%Y%m%dT%H%M%S", time.gmtime())
+            register(base, file.read())
     rows = queue.Queue()
     source = sys.stdin if args.file == "-" else open(args.file, newline="")
     threading.Thread(target=read, args=(source, rows), daemon=True).start()
     sent = accepted = 0
+    name = args.session or time.strftime("edge-%Y%m%dT%H%M%S", time.gmtime())
+    session, number = name, 1
     for batch in batches(rows, args.rows, args.seconds):
-        body = json.dumps({"session": session, "samples": batch}).encode()
-        ack = deliver("POST", base + "/telemetry", body)
         sent += len(batch)
-        accepted += ack["accepted"] + ack["duplicate"]
-        for row in ack["rejected"]:
-            say(f"seq {batch[row['index']]['seq']} rejected: {row['reason']}")
+        ack = None
+        while ack is None:
+            try:
+                ack = send(base, session, batch)
+            except Refused as refused:
+                if not refused.session_ended:
+                    say(f"seq {batch[0]['seq']} to {batch[-1]['seq']} refused: {refused}")
+                    break
+                number += 1
+                say(f"session {session} has ended; the next is {name}-{number}")
+                session = f"{name}-{number}"
+        if ack is not None:
+            accepted += ack["accepted"] + ack["duplicate"]
+            for row in ack["rejected"]:
+                say(f"seq {batch[row['index']]['seq']} rejected: {row['reason']}")
     say(f"session {session}: {sent} rows sent, {accepted} stored")
     return 0 if accepted == sent else 1
+
+
+def register(base, asset):
+    try:
+        deliver("PUT", base, asset, lambda answer: "name" in answer)
+    except Refused as refused:
+        sys.exit(f"edge_client: {refused}")
+
+
+def send(base, session, batch):
+    """Sends a batch until the service has acknowledged all of it; returns the acknowledgement."""
+
+    def acknowledges(answer):
+        return answer["accepted"] + answer["duplicate"] + len(answer["rejected"]) == len(batch)
+
+    body = json.dumps({"session": session, "samples": batch}).encode()
+    return deliver("POST", base + "/telemetry", body, acknowledges)
 
 
 def parse_arguments():
@@ -109,30 +152,45 @@ def batches(rows, max_rows, max_wait_s):
         yield batch
 
 
-def deliver(method, url, body):
-    """Sends a request until it succeeds; returns the response."""
+def deliver(method, url, body, is_expected):
+    """Sends a request until the service answers as expected; returns the answer."""
     delay = 0.2
     while True:
         request = urllib.request.Request(url, data=body, method=method, headers=HEADERS)
         try:
-            with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:
-                return json.load(answer)
+            with urllib.request.urlopen(request, timeout=TIMEOUT_S) as response:
+                answer = json.load(response)
+                if is_expected(answer):
+                    return answer
+                reason = f"{response.status}, but not an answer of offbd"
         except urllib.error.HTTPError as error:
-            if error.code not in (408, 425, 429) and error.code < 500:
-                sys.exit(f"edge_client: {error.code}: {error.read().decode(errors='replace')}")
+            problem = problem_of(error)
+            if error.code in FINAL and problem:
+                raise Refused(error.code, problem) from None
             reason = f"{error.code} {error.reason}"
             delay = max(delay, retry_after(error))
-        except (OSError, ValueError) as error:
-            reason = str(error)
+        except (OSError, http.client.HTTPException) as error:
+            reason = str(error) or type(error).__name__
+        except (ValueError, TypeError, KeyError):
+            reason = "an answer that is not of offbd"
         say(f"{reason}; retrying in {delay:.1f} s")
         time.sleep(delay * random.uniform(0.8, 1.2))
         delay = min(2 * delay, MAX_DELAY_S)
 
 
+def problem_of(error):
+    """Returns the problem of an answer of the service; None if it is of something else."""
+    try:
+        problem = json.load(error)
+        return problem if problem["type"].startswith(PROBLEM_TYPE) else None
+    except (OSError, http.client.HTTPException, ValueError, TypeError, KeyError, AttributeError):
+        return None
+
+
 def retry_after(error):
     """Returns the delay that the service requests, in seconds."""
     try:
-        return float(error.headers.get("Retry-After", 0))
+        return min(max(float(error.headers.get("Retry-After", 0)), 0.0), MAX_DELAY_S)
     except ValueError:
         return 0.0
 

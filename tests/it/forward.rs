@@ -3,7 +3,12 @@
 mod answers;
 #[cfg(target_os = "linux")]
 mod failing_disk;
+#[cfg(unix)]
+mod files;
 mod set_aside;
+#[cfg(unix)]
+mod stop;
+mod strangers;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -213,6 +218,7 @@ async fn a_batch_is_checked_like_by_the_service() {
     assert_eq!(acknowledged["rejected"][0]["index"], 1);
     assert_eq!(acknowledged["session"], "s");
     let large = agent.client.request(Method::POST, path).body(vec![b' '; 5 << 20]);
+    let large = large.header("content-type", "application/json");
     assert_eq!(agent.client.send(large).await.status, 413);
     assert_eq!(agent.status().await["waiting_batches"], 1);
 }

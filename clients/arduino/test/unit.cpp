@@ -56,6 +56,11 @@ struct Line : offbd::Connection {
   void close() override {}
 };
 
+// A refusal of the service.
+std::string problem(const char *status, const char *slug) {
+  return std::string("HTTP/1.1 ") + status + "\r\n\r\n{\"type\":\"urn:offbd:problem:" + slug + "\"}";
+}
+
 offbd::Sample at(int64_t t_us) { return {t_us, 0.5F, -0.25F, NAN, 0.125F}; }
 
 using Memory = offbd::RingMemory<8>;
@@ -172,14 +177,46 @@ void an_answer_decides_over_the_batch() {
     return ring.size() == 0;
   };
   uint32_t refused = 0;
-  CHECK(sent("HTTP/1.1 200 OK\r\n\r\n{\"rejected\":[]}", &refused) && refused == 0);
-  CHECK(sent("HTTP/1.1 200 OK\r\n\r\n{\"rejected\":[{\"index\":0}]}", &refused) && refused == 1);
-  CHECK(sent("HTTP/1.1 422 Unprocessable\r\n\r\n", &refused) && refused == 1);
+  CHECK(sent("HTTP/1.1 200 OK\r\n\r\n{\"accepted\":1,\"rejected\":[]}", &refused) && refused == 0);
+  CHECK(sent("HTTP/1.1 200 OK\r\n\r\n{\"accepted\":0,\"rejected\":[{\"index\":0}]}", &refused) && refused == 1);
+  CHECK(sent(problem("422 Unprocessable", "invalid"), &refused) && refused == 1);
+  // What is not of the service says nothing about the samples.
+  for (const char *foreign : {"HTTP/1.1 200 OK\r\n\r\n<html>Log in</html>", "HTTP/1.1 200 OK\r\n\r\n",
+                              "HTTP/1.1 204 No Content\r\n\r\n", "HTTP/1.1 413 Large\r\n\r\n<html>",
+                              "HTTP/1.1 201 Created\r\n\r\n{\"accepted\":1}"}) {
+    CHECK(!sent(foreign, &refused) && refused == 0);
+  }
+  CHECK(!sent(problem("401 Unauthorized", "unauthenticated"), &refused) && refused == 0);
   for (const char *later : {"HTTP/1.1 429 Too Many\r\n\r\n", "HTTP/1.1 503 No\r\n\r\n",
                             "HTTP/1.1 401 Who\r\n\r\n", "HTTP/1.1 404 What\r\n\r\n",
                             "HTTP/1.1 200 OK\r\ncontent-le", "", "SSH-2.0\r\n\r\n"}) {
     CHECK(!sent(later, &refused) && refused == 0);
   }
+}
+
+void samples_of_an_ended_session_go_to_another_one() {
+  Memory memory{};
+  { offbd::Ring(memory, 1).push(at(1)); }
+  offbd::Ring ring(memory, 1);
+  ring.push(at(20000));
+  Line line;
+  offbd::HttpTransport transport(line, "10.0.0.1", 8087, "rig");
+  char body[1024];
+  offbd::Uplink uplink(ring, transport, body, sizeof body);
+  const auto session = [&](const char *name) {
+    return line.sent.find(std::string("{\"session\":\"") + name + "\"") != std::string::npos;
+  };
+  line.answer = problem("409 Conflict", "session-ended");
+  uint32_t now_ms = 0;
+  uplink.poll(now_ms, true);
+  CHECK(session("board-00000001-1"));
+  uplink.poll(now_ms += 200, true);
+  CHECK(session("board-00000001-1-2"));
+  line.answer = "HTTP/1.1 200 OK\r\n\r\n{\"accepted\":1,\"rejected\":[]}";
+  uplink.poll(now_ms += 400, true);
+  CHECK(session("board-00000001-1-3") && ring.size() == 1);
+  uplink.poll(now_ms, true);
+  CHECK(session("board-00000001-2") && ring.size() == 0 && uplink.refused() == 0);
 }
 
 void numbers_that_the_service_would_refuse_are_missing() {
@@ -212,6 +249,7 @@ int main() {
   a_batch_has_samples_of_one_start_and_is_sent_until_it_is_acknowledged();
   delays_grow_and_are_bounded();
   an_answer_decides_over_the_batch();
+  samples_of_an_ended_session_go_to_another_one();
   numbers_that_the_service_would_refuse_are_missing();
   the_longest_row_fits();
   return failures;

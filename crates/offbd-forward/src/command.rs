@@ -2,7 +2,6 @@
 
 mod refused;
 
-use std::io::BufReader;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,7 +10,10 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 
-use crate::{LineFormat, MAX_SPOOL_BYTES, ServiceUrl, Spool, SpoolSender, router, spool_lines};
+use crate::stop::Stop;
+use crate::{
+    LineFormat, Lines, MAX_SPOOL_BYTES, ServiceUrl, Spool, SpoolSender, listen, router, spool_lines,
+};
 use offbd_core::engine::Rig;
 use offbd_terminal::errors::{BadArgument, InputError, read};
 
@@ -29,7 +31,8 @@ const DEFAULT_SPOOL: &str = "offbd-spool.sqlite";
     refused for good. The agent has no access control: let it listen where only\n\
     devices are.\n\n\
     Only an acknowledgement of all rows ends the wait of a batch. What the service\n\
-    refuses, and samples that it rejects, are set aside with the reason.\n\n\
+    refuses, and samples that it rejects, are set aside with the reason. On SIGINT\n\
+    and SIGTERM the agent ends once all that it has read is in the spool.\n\n\
     Examples:\n  \
     offbd forward --to https://offbd.example:8087 --token-file token \\\n      \
     --spool spool.sqlite\n  \
@@ -66,6 +69,10 @@ struct AgentArgs {
         conflicts_with = "asset"
     )]
     listen: SocketAddr,
+    /// Name by which devices address the agent, besides IP addresses and
+    /// localhost; may be given several times
+    #[arg(long, value_name = "NAME", conflicts_with = "asset")]
+    host: Vec<String>,
     /// Take the lines of stdin as samples of this asset, instead of listening
     #[arg(long, value_name = "ASSET")]
     asset: Option<String>,
@@ -101,9 +108,10 @@ fn forward(args: &AgentArgs) -> anyhow::Result<()> {
         let spool = Arc::new(spool.map_err(|e| InputError::file(&args.spool, e))?);
         let waiting = spool.status().await?.waiting_batches;
         let delivery = SpoolSender::new(spool.clone(), to);
+        let stop = Stop::at_signal()?;
         match &args.asset {
-            Some(asset) => forward_lines(args, asset, &spool, delivery).await,
-            None => serve(args, spool, delivery, waiting).await,
+            Some(asset) => forward_lines(args, asset, &spool, delivery, stop).await,
+            None => serve(args, spool, delivery, waiting, stop).await,
         }
     })
 }
@@ -113,14 +121,15 @@ async fn serve(
     spool: Arc<Spool>,
     delivery: SpoolSender,
     waiting: u64,
+    stop: Stop,
 ) -> anyhow::Result<()> {
     let listener = tokio::net::TcpListener::bind(args.listen).await;
     let listener = listener.with_context(|| format!("cannot listen on {}", args.listen))?;
     let address = listener.local_addr()?;
     tracing::info!(%address, to = args.to, waiting, "forwarding");
-    let router = router(spool, delivery.delays());
+    let router = router(spool.clone(), delivery.delays(), &args.host);
     tokio::select! {
-        served = async { axum::serve(listener, router).await } => Ok(served?),
+        () = listen::serve(listener, router, stop) => log_stop(&spool).await,
         never = delivery.run() => match never {},
     }
 }
@@ -130,6 +139,7 @@ async fn forward_lines(
     asset: &str,
     spool: &Spool,
     delivery: SpoolSender,
+    mut stop: Stop,
 ) -> anyhow::Result<()> {
     Rig::chapter(asset).check().map_err(|e| BadArgument(format!("--asset: {}", e.reason)))?;
     let name = |name: &String| format!("session={}", utf8_percent_encode(name, NON_ALPHANUMERIC));
@@ -138,14 +148,25 @@ async fn forward_lines(
         LineFormatArg::Csv => LineFormat::Csv,
         LineFormatArg::Ndjson => LineFormat::Ndjson,
     };
-    let source = BufReader::new(std::io::stdin());
-    tokio::select! {
-        () = spool_lines(spool, source, format, asset, &query) => {}
+    let lines = Lines::of_stdin(stop.clone()).context("cannot read stdin")?;
+    let n_lost = tokio::select! {
+        n_lost = spool_lines(spool, lines, format, asset, &query) => n_lost,
         never = delivery.run() => match never {},
+    };
+    anyhow::ensure!(n_lost == 0, "{n_lost} lines could not be kept");
+    tokio::select! {
+        biased;
+        () = stop.told() => return log_stop(spool).await,
+        // What was under way when the source ended is sent again.
+        () = delivery.drain() => {}
     }
-    // What was under way when the source ended is sent again.
-    delivery.drain().await;
     let n = spool.refused().await?.len();
     anyhow::ensure!(n == 0, "of {n} batches all or a part is refused: see `offbd forward list`");
+    Ok(())
+}
+
+async fn log_stop(spool: &Spool) -> anyhow::Result<()> {
+    let waiting = spool.status().await?.waiting_batches;
+    tracing::info!(waiting, "stopping; what waits is sent after the next start");
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! When an asset whose batch was not stored is tried again, and why it waits.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -15,6 +15,21 @@ use offbd_net::Reasons;
 const FIRST_DELAY: Duration = Duration::from_millis(200);
 /// Longest delay between two attempts of an asset.
 pub(super) const LONGEST_DELAY: Duration = Duration::from_secs(30);
+
+/// Most assets whose batches are under way at the same time; the others wait until one ends.
+/// Chosen: each holds a connection and a batch of up to 4 MiB.
+pub(super) const MAX_AT_ONCE: usize = 16;
+/// Most of these whose last attempt failed. Chosen: however many do not get an answer, there is
+/// room for those that do.
+const MAX_FAILING_AT_ONCE: usize = 8;
+
+/// What can be sent.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Due {
+    pub assets: Vec<String>,
+    /// How long it is until a delay ends, at most [`LONGEST_DELAY`].
+    pub next: Duration,
+}
 
 /// The assets whose last attempt failed.
 #[derive(Debug, Default)]
@@ -42,14 +57,26 @@ pub(super) struct DelayView {
 }
 
 impl Delays {
-    /// Returns up to `limit` of `assets` that may be tried, and forgets all others.
-    pub(super) fn due(&self, assets: Vec<String>, limit: usize) -> Vec<String> {
+    /// Returns which of `assets`, of which those `under_way` are not to be tried now, may be tried
+    /// so that at most [`MAX_AT_ONCE`] are under way, and forgets all others.
+    pub(super) fn due(&self, mut assets: Vec<String>, under_way: &BTreeSet<String>) -> Due {
         let (mut delays, now) = (self.assets(), now());
-        delays.retain(|asset, _| assets.contains(asset));
-        let is_due = |asset: &String| {
-            delays.get(asset).and_then(|delay| delay.until).is_none_or(|until| until <= now)
-        };
-        assets.into_iter().filter(is_due).take(limit).collect()
+        delays.retain(|asset, _| assets.contains(asset) || under_way.contains(asset));
+        assets.retain(|asset| !under_way.contains(asset));
+        let until = |asset: &String| delays.get(asset).and_then(|delay| delay.until);
+        let next = assets.iter().filter_map(until).filter(|until| *until > now).min();
+        let mut room = MAX_AT_ONCE.saturating_sub(under_way.len());
+        let n_failing = under_way.iter().filter(|asset| until(asset).is_some()).count();
+        let mut room_of_failing = MAX_FAILING_AT_ONCE.saturating_sub(n_failing);
+        assets.retain(|asset| {
+            let until = until(asset);
+            let may = until.is_none_or(|until| until <= now && room_of_failing > 0) && room > 0;
+            room -= usize::from(may);
+            room_of_failing -= usize::from(may && until.is_some());
+            may
+        });
+        let next = next.map_or(LONGEST_DELAY, |next| next.saturating_duration_since(now));
+        Due { assets, next }
     }
 
     /// Notes a failure; returns whether it is to be logged.
@@ -66,12 +93,6 @@ impl Delays {
 
     pub(super) fn succeeded(&self, asset: &str) {
         self.assets().remove(asset);
-    }
-
-    /// Returns how long it is until the next asset is due, at most [`LONGEST_DELAY`].
-    pub(super) fn rest(&self) -> Duration {
-        let next = self.assets().values().filter_map(|delay| delay.until).min();
-        next.map_or(LONGEST_DELAY, |at| at.saturating_duration_since(now()))
     }
 
     /// Returns the assets that wait, at most [`MAX_NAMED`].
@@ -93,4 +114,36 @@ impl Delays {
 #[expect(clippy::disallowed_methods, reason = "delays between attempts")]
 fn now() -> Instant {
     Instant::now()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(names: std::ops::Range<usize>) -> Vec<String> {
+        names.map(|n| format!("a{n:02}")).collect()
+    }
+
+    #[test]
+    fn assets_without_an_answer_leave_room_for_the_others() {
+        let (delays, all, idle) = (Delays::default(), named(0..40), BTreeSet::new());
+        let first = delays.due(all.clone(), &idle);
+        assert_eq!(first, Due { assets: named(0..MAX_AT_ONCE), next: LONGEST_DELAY });
+        let failed = Failure { wait: Some(LONGEST_DELAY), ..Failure::new("no answer") };
+        for asset in &first.assets {
+            assert!(delays.failed(asset, &failed));
+        }
+        let second = delays.due(all.clone(), &idle);
+        assert_eq!(second.assets, named(16..32));
+        assert!(!second.next.is_zero() && second.next <= LONGEST_DELAY);
+        for delay in delays.assets().values_mut() {
+            delay.until = Some(now());
+        }
+        // Now all may be tried, the oldest first.
+        let third = delays.due(all.clone(), &idle);
+        assert_eq!(third.assets, [named(0..8), named(16..24)].concat());
+        // Those that go on without an answer take no more than their part.
+        let under_way = third.assets[..12].iter().cloned().collect();
+        assert_eq!(delays.due(all, &under_way).assets, named(20..24));
+    }
 }

@@ -1,17 +1,20 @@
 //! Forwards the batches of a spool, in order for each asset, until each is acknowledged.
 
+use std::collections::BTreeSet;
 use std::convert::Infallible;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::{Body, to_bytes};
-use futures_util::future::join_all;
+use futures_util::StreamExt;
+use futures_util::stream::FuturesUnordered;
 use hyper::header::{AUTHORIZATION, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
 use hyper::{Request, Uri};
 use tokio::time::{sleep, timeout};
 
 use super::answer::{Attempt, Failure, meaning};
-use super::delays::{Delays, LONGEST_DELAY};
+use super::delays::{Delays, Due, LONGEST_DELAY, MAX_AT_ONCE};
 use super::spool::{NewBatch, Spool, SpoolError, WaitingBatch};
 use offbd_net::{HttpsClient, Reasons, https_client};
 
@@ -19,8 +22,6 @@ use offbd_net::{HttpsClient, Reasons, https_client};
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
 /// Delay after an error of the spool.
 const SPOOL_RETRY: Duration = Duration::from_secs(1);
-/// Most assets whose batches are under way at the same time; the others wait for their turn.
-const MAX_AT_ONCE: usize = 8;
 /// Longest response that is read, bytes; a longer one counts as cut off. Chosen: the
 /// acknowledgement of the largest batch with a reason for each row has about 2.5 MB.
 const MAX_ANSWER_BYTES: usize = 4 << 20;
@@ -136,71 +137,91 @@ impl SpoolSender {
     /// Forwards for ever.
     pub async fn run(&self) -> Infallible {
         loop {
-            self.turn().await;
+            self.drain().await;
+            let _ = timeout(LONGEST_DELAY, self.spool.added.notified()).await;
         }
     }
 
-    /// Forwards until nothing waits.
+    /// Forwards until nothing waits: one batch of each asset at a time, and the next one as soon as
+    /// it is settled, so that an asset without an answer holds up no other. Does not end if the
+    /// spool fails: the disk may have room again, and deletions make some.
     pub async fn drain(&self) {
-        while !self.spool.assets().await.is_ok_and(|assets| assets.is_empty()) {
-            self.turn().await;
-        }
-    }
-
-    /// Sends what is due, or waits. Does not end if the spool fails: the disk may have room again,
-    /// and deletions make some.
-    async fn turn(&self) {
-        match self.send_due().await {
-            Ok(true) => self.errors.clear(),
-            Ok(false) => self.wait().await,
-            Err(error) => {
-                if self.errors.is_new(&error) {
-                    tracing::error!(%error, "trying again");
+        let mut under_way = BTreeSet::new();
+        let mut settled = FuturesUnordered::new();
+        loop {
+            let mut waiting = pin!(self.waiting());
+            let waiting = loop {
+                tokio::select! {
+                    waiting = &mut waiting => break waiting,
+                    // Goes on meanwhile: one of these may be the next that gets the file.
+                    Some(asset) = settled.next() => {
+                        under_way.remove(&asset);
+                    }
                 }
-                sleep(SPOOL_RETRY).await;
+            };
+            let next = match waiting {
+                Ok(assets) => {
+                    self.errors.clear();
+                    if assets.is_empty() && under_way.is_empty() {
+                        return;
+                    }
+                    let Due { assets, next } = self.delays.due(assets, &under_way);
+                    under_way.extend(assets.iter().cloned());
+                    settled.extend(assets.into_iter().map(|asset| self.forward_oldest(asset)));
+                    next
+                }
+                Err(error) => {
+                    if self.errors.is_new(&error) {
+                        tracing::error!(%error, "trying again");
+                    }
+                    SPOOL_RETRY
+                }
+            };
+            let has_room = under_way.len() < MAX_AT_ONCE;
+            tokio::select! {
+                Some(asset) = settled.next() => {
+                    under_way.remove(&asset);
+                }
+                () = sleep(next) => {}
+                () = self.spool.added.notified(), if has_room => {}
             }
         }
     }
 
-    /// Sends the oldest batch of each asset that is due; returns whether there was one.
-    async fn send_due(&self) -> Result<bool, SpoolError> {
+    /// The assets of which batches wait. Also looks whether the disk has room again.
+    async fn waiting(&self) -> Result<Vec<String>, SpoolError> {
         let assets = self.spool.assets().await?;
         self.spool.regain_reserve(assets.is_empty()).await;
-        let due = self.delays.due(assets, MAX_AT_ONCE);
-        let (spool, to) = (&self.spool, &self.to);
-        let sent = join_all(due.iter().map(|asset| async move {
-            let Some(waiting) = spool.oldest(asset).await? else { return Ok(None) };
-            let attempt = to.send(&waiting.batch).await;
-            Ok(Some((waiting, attempt)))
-        }));
-        let sent: Vec<Result<Option<(WaitingBatch, Attempt)>, SpoolError>> = sent.await;
-        let mut read = Ok(!due.is_empty());
-        for sent in sent {
-            match sent {
-                Ok(Some((waiting, attempt))) => self.settle(waiting, attempt).await,
-                Ok(None) => {}
-                Err(error) => read = Err(error),
-            }
-        }
-        read
+        Ok(assets)
     }
 
-    async fn settle(&self, waiting: WaitingBatch, attempt: Attempt) {
-        let failure = match self.try_settle(&waiting, attempt).await {
-            Ok(None) => return self.delays.succeeded(&waiting.batch.asset),
+    /// Sends the oldest batch of an asset once; returns the asset.
+    async fn forward_oldest(&self, asset: String) -> String {
+        let failure = match self.try_oldest(&asset).await {
+            Ok(None) => {
+                self.delays.succeeded(&asset);
+                return asset;
+            }
             Ok(Some(failure)) => failure,
             Err(error) => Failure::new(error.to_string()),
         };
-        let asset = waiting.batch.asset.as_str();
-        if self.delays.failed(asset, &failure) {
+        if self.delays.failed(&asset, &failure) {
             let Failure { cause, answer, .. } = failure;
             let waiting = self.spool.status().await.map(|status| status.waiting_batches).ok();
             tracing::warn!(asset, reason = cause, answer, waiting, "a batch waits");
         }
+        asset
+    }
+
+    /// As [`Self::forward_oldest`]; returns why the batch still waits.
+    async fn try_oldest(&self, asset: &str) -> Result<Option<Failure>, SpoolError> {
+        let Some(waiting) = self.spool.oldest(asset).await? else { return Ok(None) };
+        let attempt = self.to.send(&waiting.batch).await;
+        self.settle(&waiting, attempt).await
     }
 
     /// Does with a batch what an attempt demands; returns why it still waits.
-    async fn try_settle(
+    async fn settle(
         &self,
         waiting: &WaitingBatch,
         attempt: Attempt,
@@ -220,13 +241,5 @@ impl SpoolSender {
             }
         }
         Ok(None)
-    }
-
-    /// Waits for a new batch or the end of a delay.
-    async fn wait(&self) {
-        tokio::select! {
-            () = sleep(self.delays.rest()) => {}
-            () = self.spool.added.notified() => {}
-        }
     }
 }

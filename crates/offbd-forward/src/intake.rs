@@ -1,27 +1,30 @@
 //! Takes batches over HTTP, at the path and in the formats of the service.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Path, RawQuery, State};
-use axum::http::HeaderMap;
+use axum::extract::{DefaultBodyLimit, FromRequest, Path, RawQuery, Request, State};
 use axum::http::header::CONTENT_TYPE;
-use axum::middleware::from_fn;
+use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use offbd_core::engine::Rig;
 use serde::Serialize;
+use tokio::time::timeout;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 
 use super::delays::{DelayView, Delays};
-use super::media_type;
 use super::refusal::{self, Refusal};
 use super::spool::{NewBatch, Spool, SpoolStatus};
+use super::strangers;
 use offbd_net::unread_body;
 use offbd_wire::telemetry::{AckView, Batch, RowView, TelemetryFormat};
 
 /// Longest body, bytes; a longer one is refused with 413.
 const MAX_BODY_BYTES: usize = 4 << 20;
+/// Longest time until a body has arrived; then it is refused with 408.
+pub(super) const BODY_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most samples of a batch; more are refused with 413. The default limit of the service.
 pub(super) const MAX_BATCH_SAMPLES: usize = 10_000;
 
@@ -36,8 +39,8 @@ struct AgentStatus {
     held_up: Vec<DelayView>,
 }
 
-/// The routes of the agent.
-pub fn router(spool: Arc<Spool>, delays: Arc<Delays>) -> Router {
+/// The routes of the agent, which may be addressed by these names besides IP addresses.
+pub fn router(spool: Arc<Spool>, delays: Arc<Delays>, names: &[String]) -> Router {
     let router = Router::new()
         .route("/api/v1/assets/{asset}/telemetry", post(take))
         .route("/api/v1/spool", get(status))
@@ -49,6 +52,7 @@ pub fn router(spool: Arc<Spool>, delays: Arc<Delays>) -> Router {
         PropagateRequestIdLayer::x_request_id(),
         from_fn(unread_body::discard),
         from_fn(refusal::name_request),
+        from_fn_with_state(Arc::<[String]>::from(names), strangers::refuse),
     ))
 }
 
@@ -58,12 +62,15 @@ async fn take(
     State((spool, _)): State<AgentState>,
     Path(asset): Path<String>,
     RawQuery(query): RawQuery,
-    headers: HeaderMap,
-    body: Bytes,
+    request: Request,
 ) -> Result<Json<AckView>, Refusal> {
-    let header = headers.get(CONTENT_TYPE).map(|header| header.to_str().unwrap_or_default());
-    let media_type = media_type(header).to_owned();
-    let parsed = TelemetryFormat::of_type(&media_type)?.parse(&body, MAX_BATCH_SAMPLES)?;
+    // A page of another site may send a body without a type; one with a type only if it is allowed.
+    let header = request.headers().get(CONTENT_TYPE).and_then(|header| header.to_str().ok());
+    let media_type = header.unwrap_or_default().to_owned();
+    let format = TelemetryFormat::of_type(&media_type)?;
+    let body = timeout(BODY_TIMEOUT, Bytes::from_request(request, &())).await;
+    let body = body.map_err(|_| Refusal::SlowBody)??;
+    let parsed = format.parse(&body, MAX_BATCH_SAMPLES)?;
     Rig::chapter(&asset).check()?;
     let query = query.unwrap_or_default();
     spool.put(&NewBatch { asset, query, media_type, body: body.into() }).await?;

@@ -11,11 +11,16 @@ mod answer;
 pub mod command;
 mod delays;
 mod delivery;
+mod files;
 mod intake;
 mod lines;
+mod listen;
 mod refusal;
 mod reserve;
+mod source;
 mod spool;
+mod stop;
+mod strangers;
 
 use offbd_wire::telemetry::{Batch, TelemetryFormat};
 
@@ -23,15 +28,11 @@ pub use delays::Delays;
 pub use delivery::{InvalidServiceUrl, ServiceUrl, SpoolSender};
 pub use intake::router;
 pub use lines::{LineFormat, spool_lines};
+pub use source::Lines;
 pub use spool::{MAX_SPOOL_BYTES, NewBatch, RefusedBatch, Spool, SpoolError, SpoolStatus};
 
 /// Parses a batch, as the service does.
 fn parsed(batch: &NewBatch) -> Result<Batch, String> {
     let format = TelemetryFormat::of_type(&batch.media_type).map_err(|e| e.to_string())?;
     format.parse(&batch.body, intake::MAX_BATCH_SAMPLES).map_err(|e| e.to_string())
-}
-
-/// The format of a batch, by its media type.
-fn media_type(header: Option<&str>) -> &str {
-    header.unwrap_or("application/json")
 }

@@ -1,21 +1,19 @@
 //! Takes the lines of a stream, CSV or NDJSON, and puts them into the spool in batches.
 
-use std::io::{BufRead, Read};
 use std::time::Duration;
 
-use tokio::sync::mpsc;
 use tokio::time::{sleep, timeout};
 
 use super::parsed;
-use super::spool::{NewBatch, Spool};
+use super::source::Lines;
+use super::spool::{NewBatch, Spool, SpoolError};
+use super::stop::Stop;
 use offbd_net::Reasons;
 
 /// Most lines of a batch.
 const MAX_BATCH_LINES: usize = 100;
 /// Longest time that a line waits for a full batch.
 const LONGEST_WAIT: Duration = Duration::from_millis(500);
-/// Longest line, bytes; a longer one ends the stream with an error.
-const MAX_LINE_BYTES: u64 = 1 << 20;
 /// How often a spool that is full or fails is tried if no room is reported.
 const RETRY: Duration = Duration::from_secs(1);
 
@@ -36,31 +34,32 @@ impl LineFormat {
     }
 }
 
-/// Reads `source` to its end on a thread of its own, and spools its lines for `asset`. While the
-/// spool is full or fails the source is not read, so that its writer waits. An error of the source
-/// ends it and is logged.
+/// Spools `lines` for `asset` to their end; returns the number of those that it could not keep.
+/// While the spool is full or fails the source is not read, so that its writer waits; when the
+/// agent is told to stop, what was read is kept beyond the limit.
 pub async fn spool_lines(
     spool: &Spool,
-    source: impl BufRead + Send + 'static,
+    mut lines: Lines,
     format: LineFormat,
     asset: &str,
     query: &str,
-) {
-    let (send, mut lines) = mpsc::channel(MAX_BATCH_LINES);
-    std::thread::spawn(move || read(source, &send));
+) -> usize {
     let header = match format {
-        LineFormat::Csv => lines.recv().await.unwrap_or_default(),
+        LineFormat::Csv => lines.next().await.unwrap_or_default(),
         LineFormat::Ndjson => Vec::new(),
     };
     let invalid = Reasons::default();
-    while let Some(first) = lines.recv().await {
+    let mut n_lost = 0;
+    while let Some(first) = lines.next().await {
         let mut body = header.clone();
         body.extend(first);
+        let mut n = 1;
         // Ends when the batch is full, the time is over, or the source has ended.
         let _ = timeout(LONGEST_WAIT, async {
-            for _ in 1..MAX_BATCH_LINES {
-                let Some(line) = lines.recv().await else { break };
+            while n < MAX_BATCH_LINES {
+                let Some(line) = lines.next().await else { break };
                 body.extend(line);
+                n += 1;
             }
         })
         .await;
@@ -68,8 +67,12 @@ pub async fn spool_lines(
         let media_type = format.media_type().to_owned();
         let batch = NewBatch { asset, query, media_type, body };
         log_invalid(&batch, &invalid);
-        put(spool, &batch).await;
+        if let Err(error) = put(spool, &batch, lines.stop()).await {
+            tracing::error!(%error, n, "lines are lost");
+            n_lost += n;
+        }
     }
+    n_lost
 }
 
 /// Logs why lines are not samples, each reason once: the service rejects them, and a pipe, unlike
@@ -86,44 +89,22 @@ fn log_invalid(batch: &NewBatch, logged: &Reasons) {
     }
 }
 
-/// Adds a batch, once there is room for it and the spool does not fail.
-async fn put(spool: &Spool, batch: &NewBatch) {
+/// Adds a batch, once there is room for it and the spool does not fail, or at once when the agent
+/// is told to stop.
+async fn put(spool: &Spool, batch: &NewBatch, mut stop: Stop) -> Result<(), SpoolError> {
     let logged = Reasons::default();
     while let Err(error) = spool.put(batch).await {
+        if stop.is_told() {
+            return spool.put_last(batch).await;
+        }
         if logged.is_new(&error) {
             tracing::warn!(%error, "the source waits");
         }
         tokio::select! {
             () = spool.freed.notified() => {}
             () = sleep(RETRY) => {}
+            () = stop.told() => {}
         }
     }
-}
-
-/// Sends each line, with its end.
-fn read(mut source: impl BufRead, to: &mpsc::Sender<Vec<u8>>) {
-    loop {
-        let mut line = Vec::new();
-        match (&mut source).take(MAX_LINE_BYTES).read_until(b'\n', &mut line) {
-            Ok(0) => return,
-            Ok(n) if n as u64 == MAX_LINE_BYTES && line.last() != Some(&b'\n') => {
-                tracing::error!(
-                    "a line is longer than {MAX_LINE_BYTES} bytes; the rest is not read"
-                );
-                return;
-            }
-            Ok(_) => {
-                if line.last() != Some(&b'\n') {
-                    line.push(b'\n');
-                }
-                if to.blocking_send(line).is_err() {
-                    return;
-                }
-            }
-            Err(error) => {
-                tracing::error!(%error, "the source cannot be read");
-                return;
-            }
-        }
-    }
+    Ok(())
 }

@@ -2,6 +2,7 @@
 
 use axum::body::Body;
 use axum::extract::Request;
+use axum::extract::rejection::BytesRejection;
 use axum::http::StatusCode;
 use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
 use axum::middleware::Next;
@@ -12,6 +13,7 @@ use offbd_wire::telemetry::{BatchError, UnsupportedMediaType};
 use serde_json::{Value, json};
 use tower_http::request_id::RequestId;
 
+use super::intake::BODY_TIMEOUT;
 use super::spool::SpoolError;
 
 /// When a device may try again while the spool takes no more, s.
@@ -28,6 +30,14 @@ pub(super) enum Refusal {
     Asset(#[from] Invalid),
     #[error(transparent)]
     Spool(#[from] SpoolError),
+    #[error(transparent)]
+    Body(#[from] BytesRejection),
+    #[error("the body was not received in {} s", BODY_TIMEOUT.as_secs())]
+    SlowBody,
+    #[error("`Host` must be an IP address, localhost, or a name that is given with --host")]
+    Host,
+    #[error("the request comes from a page of another site")]
+    Origin,
 }
 
 impl Refusal {
@@ -43,6 +53,13 @@ impl Refusal {
             Self::Batch(BatchError::TooMany { .. }) => {
                 (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
             }
+            Self::Body(rejection) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
+                (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
+            }
+            Self::Body(_) => (StatusCode::BAD_REQUEST, "malformed", "Malformed body"),
+            Self::SlowBody => (StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout"),
+            Self::Host => (StatusCode::MISDIRECTED_REQUEST, "misdirected", "Misdirected request"),
+            Self::Origin => (StatusCode::FORBIDDEN, "forbidden", "Forbidden"),
             Self::Asset(_) => (StatusCode::UNPROCESSABLE_ENTITY, "invalid", "Invalid value"),
             Self::Spool(SpoolError::Full { .. }) => {
                 (StatusCode::TOO_MANY_REQUESTS, "spool-full", "Spool full")

@@ -1,7 +1,5 @@
 //! Space that is kept on the disk, because SQLite needs some to delete.
 
-use std::ffi::OsString;
-use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -30,9 +28,7 @@ pub(super) struct Reserve {
 impl Reserve {
     /// The reserve of the spool at `spool`, which is not kept yet.
     pub(super) fn of(spool: &Path) -> Self {
-        let mut path = OsString::from(spool);
-        path.push("-reserve");
-        Self { path: path.into(), is_kept: false, since: now() }
+        Self { path: super::files::with_ending(spool, "-reserve"), is_kept: false, since: now() }
     }
 
     pub(super) const fn is_kept(&self) -> bool {
@@ -66,7 +62,7 @@ impl Reserve {
 }
 
 fn fill(path: &Path) -> io::Result<()> {
-    let mut file = File::options().append(true).create(true).open(path)?;
+    let mut file = super::files::private().append(true).create(true).open(path)?;
     let block = [0; 64 << 10];
     let mut n = file.metadata()?.len();
     while n < RESERVE_BYTES {

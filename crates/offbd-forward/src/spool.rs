@@ -33,6 +33,10 @@ pub enum SpoolError {
     /// Nothing was changed.
     #[error("no batch {0} is set aside")]
     NotSetAside(i64),
+    #[error("the spool has the format {0} of a later version of offbd; this one knows {VERSION}")]
+    Later(i64),
+    #[error("the spool cannot be used: {0}")]
+    File(#[from] std::io::Error),
     #[error("the spool cannot be used: {0}")]
     Sql(#[from] sqlx::Error),
 }
@@ -150,7 +154,11 @@ impl SpoolFile {
 const VACUUM: &str = "PRAGMA incremental_vacuum(256)";
 const CHECKPOINT: &str = "PRAGMA wal_checkpoint(RESTART)";
 
+/// Version of the format, `PRAGMA user_version` of the file.
+const VERSION: i64 = 1;
+
 const SCHEMA: &str = "
+    PRAGMA user_version = 1;
     CREATE TABLE IF NOT EXISTS batch (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         asset TEXT NOT NULL,
@@ -165,17 +173,23 @@ impl Spool {
     /// Opens the spool at `path`, or creates it. Batches of up to `limit_bytes` fit.
     ///
     /// # Errors
-    /// [`SpoolError::Sql`] if the file cannot be used, or another process uses it.
+    /// [`SpoolError`] if the file cannot be used, another process uses it, or a later version of
+    /// offbd has written it.
     pub async fn open(path: &Path, limit_bytes: u64) -> Result<Self, SpoolError> {
+        super::files::prepare(path)?;
         let options = SqliteConnectOptions::new()
             .filename(path)
-            .create_if_missing(true)
             .locking_mode(SqliteLockingMode::Exclusive)
             .auto_vacuum(SqliteAutoVacuum::Incremental)
             .journal_mode(SqliteJournalMode::Wal)
             // A commit is on the disk before it returns, also after a power cut.
             .synchronous(SqliteSynchronous::Full);
         let mut connection = options.connect().await.map_err(open_error)?;
+        let version = sqlx::query_scalar("PRAGMA user_version").fetch_one(&mut connection);
+        let version: i64 = version.await.map_err(open_error)?;
+        if version > VERSION {
+            return Err(SpoolError::Later(version));
+        }
         sqlx::raw_sql(SCHEMA).execute(&mut connection).await.map_err(open_error)?;
         let used_bytes = used_bytes(&mut connection).await?;
         let mut reserve = Reserve::of(path);
@@ -199,23 +213,32 @@ impl Spool {
         if !file.reserve.is_kept() {
             return Err(SpoolError::NoReserve);
         }
-        let insert = "INSERT INTO batch (asset, query, media_type, body) VALUES ($1, $2, $3, $4)";
-        sqlx::query(insert)
-            .bind(&batch.asset)
-            .bind(&batch.query)
-            .bind(&batch.media_type)
-            .bind(&batch.body)
-            .execute(&mut file.connection)
-            .await?;
+        insert(&mut file.connection, batch).await?;
         file.used_bytes += bytes;
         self.added.notify_one();
         Ok(())
     }
 
+    /// Adds a batch beyond the limit, if need be in the room of the reserve: what the agent has
+    /// read when it is told to stop.
+    pub(super) async fn put_last(&self, batch: &NewBatch) -> Result<(), SpoolError> {
+        let mut file = self.file.lock().await;
+        file.change(async |connection| insert(connection, batch).await).await?;
+        file.used_bytes += cost(&batch.body);
+        Ok(())
+    }
+
     /// Returns the assets of which batches wait, in the order of their oldest batch.
     pub(super) async fn assets(&self) -> Result<Vec<String>, SpoolError> {
-        let select =
-            "SELECT asset FROM batch WHERE refusal IS NULL GROUP BY asset ORDER BY MIN(id)";
+        // Seeks each asset in the index, instead of reading an entry for each batch.
+        let select = "WITH RECURSIVE waits(asset, id) AS (
+                SELECT * FROM (SELECT asset, id FROM batch
+                    WHERE refusal IS NULL ORDER BY asset, id LIMIT 1)
+                UNION ALL
+                SELECT next.asset, next.id FROM waits JOIN batch AS next ON next.id = (
+                    SELECT id FROM batch WHERE refusal IS NULL AND asset > waits.asset
+                    ORDER BY asset, id LIMIT 1))
+            SELECT asset FROM waits ORDER BY id";
         let mut file = self.file.lock().await;
         Ok(sqlx::query_scalar(select).fetch_all(&mut file.connection).await?)
     }
@@ -360,6 +383,13 @@ impl Spool {
             refused,
         })
     }
+}
+
+async fn insert(connection: &mut SqliteConnection, batch: &NewBatch) -> Result<(), SpoolError> {
+    let insert = "INSERT INTO batch (asset, query, media_type, body) VALUES ($1, $2, $3, $4)";
+    let insert = sqlx::query(insert).bind(&batch.asset).bind(&batch.query);
+    insert.bind(&batch.media_type).bind(&batch.body).execute(connection).await?;
+    Ok(())
 }
 
 /// Returns what is set aside, up to `limit` batches, the oldest first.

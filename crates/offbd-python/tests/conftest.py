@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -72,6 +73,104 @@ class Service:
         self.reader.join()
         assert self.process.stderr is not None
         self.process.stderr.close()
+
+
+class Peer:
+    """Answers the next requests itself, each with the bytes of a list, or with silence if they
+    are None, and passes later ones on to the service."""
+
+    def __init__(self, service: Service | None = None) -> None:
+        self.service = service
+        self.answers: list[bytes | None] = []
+        self.silent: list[socket.socket] = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+
+    def accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                return
+            try:
+                if self.is_answered(connection):
+                    connection.close()
+            except OSError:
+                connection.close()  # a client that has given up
+
+    def is_answered(self, connection: socket.socket) -> bool:
+        request = read_request(connection)
+        answer = self.answers.pop(0) if self.answers else self.answer_of_service(request)
+        if answer is None:
+            self.silent.append(connection)
+            return False
+        connection.sendall(answer)
+        return True
+
+    def answer_of_service(self, request: bytes) -> bytes:
+        assert self.service is not None
+        host, port = self.service.listen.rsplit(":", 1)
+        with socket.create_connection((host, int(port))) as upstream:
+            upstream.sendall(request)
+            return read_all(upstream)
+
+    def close(self) -> None:
+        self.listener.close()
+        for connection in self.silent:
+            connection.close()
+
+
+def answered(status: str, body: str, kind: str = "text/html", cut: int | None = None) -> bytes:
+    """An answer as it is on the line; `cut` bytes of its body are missing."""
+    head = f"HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {len(body)}\r\n"
+    whole = body if cut is None else body[:-cut]
+    return (head + "Connection: close\r\n\r\n" + whole).encode()
+
+
+def problem(status: str, slug: str) -> bytes:
+    """A refusal of the service."""
+    body = {"type": f"urn:offbd:problem:{slug}", "title": slug, "status": int(status[:3])}
+    return answered(status, json.dumps(body), "application/problem+json")
+
+
+def read_request(connection: socket.socket) -> bytes:
+    data = b""
+    while b"\r\n\r\n" not in data:
+        data += received(connection)
+    head, _, body = data.partition(b"\r\n\r\n")
+    length = 0
+    for line in head.split(b"\r\n"):
+        name, _, value = line.partition(b":")
+        if name.lower() == b"content-length":
+            length = int(value)
+    while len(body) < length:
+        body += received(connection)
+    return head + b"\r\n\r\n" + body
+
+
+def received(connection: socket.socket) -> bytes:
+    part = connection.recv(65536)
+    if not part:
+        raise ConnectionError("the client has gone")
+    return part
+
+
+def read_all(connection: socket.socket) -> bytes:
+    data = b""
+    while part := connection.recv(65536):
+        data += part
+    return data
+
+
+@pytest.fixture
+def peer(service: Service) -> Iterator[Peer]:
+    made = Peer(service)
+    yield made
+    made.close()
 
 
 @pytest.fixture

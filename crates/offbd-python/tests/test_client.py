@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from conftest import Service
+from conftest import Peer, Service, answered, problem, read_all, read_request
 
 import offbd
 
@@ -60,35 +60,6 @@ class LossyProxy:
                 connection.sendall(answer)
             except OSError:
                 pass
-
-
-def read_request(connection: socket.socket) -> bytes:
-    data = b""
-    while b"\r\n\r\n" not in data:
-        data += received(connection)
-    head, _, body = data.partition(b"\r\n\r\n")
-    length = 0
-    for line in head.split(b"\r\n"):
-        name, _, value = line.partition(b":")
-        if name.lower() == b"content-length":
-            length = int(value)
-    while len(body) < length:
-        body += received(connection)
-    return head + b"\r\n\r\n" + body
-
-
-def received(connection: socket.socket) -> bytes:
-    part = connection.recv(65536)
-    if not part:
-        raise ConnectionError("the client has gone")
-    return part
-
-
-def read_all(connection: socket.socket) -> bytes:
-    data = b""
-    while part := connection.recv(65536):
-        data += part
-    return data
 
 
 @pytest.fixture
@@ -177,6 +148,89 @@ def test_a_service_that_cannot_be_reached_is_an_error_after_the_patience() -> No
     assert failure.value.status is None
     with pytest.raises(ValueError, match="http://"):
         offbd.Client("127.0.0.1:8087")
+
+
+HTML = "<html><h1>Log in</h1></html>"
+
+
+@pytest.mark.parametrize(
+    ("answer", "told", "status"),
+    [
+        (answered("200 OK", HTML), "200 OK, but not an answer of offbd: <html><h1>Log in", None),
+        (answered("200 OK", "{}"), "200 OK, but not an answer of offbd: {}", None),
+        (answered("200 OK", ""), "200 OK, but not an answer of offbd", None),
+        (answered("200 OK", '{"accepted": 1}', cut=4), "IncompleteRead", None),
+        (answered("501 Not Implemented", HTML), "501 Not Implemented: <html><h1>Log in", 501),
+        (problem("429 Too Many Requests", "busy"), "429 Too Many Requests: busy", 429),
+    ],
+)
+def test_what_a_peer_answers_that_has_not_stored_the_samples_is_told(
+    peer: Peer, caplog: pytest.LogCaptureFixture, answer: bytes, told: str, status: int | None
+) -> None:
+    offbd.Client(peer.service.url).put_asset("rig", {})  # type: ignore[union-attr]
+    samples = [{"seq": 1, "t_s": 0.0}]
+    peer.answers = [answer]
+    with pytest.raises(offbd.ClientError) as failure:
+        offbd.Client(peer.url, patience_s=0.0).send("rig", samples, session="s")
+    assert told in str(failure.value) and peer.url in str(failure.value)
+    assert (failure.value.status, failure.value.is_final) == (status, False)
+    assert caplog.records == []
+    # With patience it is logged, and the samples are sent again.
+    peer.answers = [answer]
+    assert offbd.Client(peer.url).send("rig", samples, session="s").accepted == 1
+    assert [(r.name, r.levelname, told in r.getMessage()) for r in caplog.records] == [
+        ("offbd", "WARNING", True)
+    ]
+
+
+def test_the_patience_is_bounded_unless_the_caller_says_otherwise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as unused:
+        port = unused.getsockname()[1]
+    clock = [0.0]
+
+    def sleep(seconds: float) -> None:
+        clock[0] += seconds
+        if clock[0] > 1000.0:
+            raise TimeoutError("the client waits for ever")
+
+    monkeypatch.setattr("offbd.client.time.sleep", sleep)
+    monkeypatch.setattr("offbd.client.time.monotonic", lambda: clock[0])
+    with pytest.raises(offbd.ClientError, match="refused"):
+        offbd.Client(f"http://127.0.0.1:{port}").assets()
+    assert 10.0 < clock[0] <= 60.0
+    with pytest.raises(TimeoutError, match="for ever"):
+        offbd.Client(f"http://127.0.0.1:{port}", patience_s=None).assets()
+
+
+def test_only_a_refusal_of_samples_by_the_service_itself_is_final(
+    service: Service, peer: Peer
+) -> None:
+    client = offbd.Client(peer.url)
+
+    def refusal(asset: str = "rig", **more: str) -> offbd.ClientError:
+        with pytest.raises(offbd.ClientError) as refused:
+            client.send(asset, [{"seq": 1, "t_s": 0.0}], **more)
+        return refused.value
+
+    missing = refusal()
+    assert (missing.status, missing.is_final) == (404, False)
+    client.put_asset("rig", {})
+    name = refusal(session="x" * 300)
+    assert (name.status, name.is_final, name.session_ended) == (422, True, False)
+    peer.answers = [answered("413 Payload Too Large", HTML)]
+    proxy = refusal()
+    assert (proxy.status, proxy.is_final) == (413, False)
+    peer.answers = [problem("401 Unauthorized", "unauthenticated")]
+    assert not refusal().is_final
+    stored = client.send("rig", [{"seq": 0, "t_s": 0.0}], session="s")
+    assert stored.session_id is not None
+    client.end_session(stored.session_id)
+    with pytest.raises(offbd.ClientError) as ended:
+        client.send("rig", [{"seq": 1, "t_s": 1.0}], session="s")
+    assert (ended.value.status, ended.value.is_final) == (409, True)
+    assert ended.value.session_ended
 
 
 def test_rows_of_a_table_are_what_is_sent(folder: Path) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import importlib.util
+import socket
 import sys
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import Service
+from conftest import Peer, Service, answered, problem
 
 import offbd
 
@@ -35,6 +38,7 @@ def deliver_all(one: Any) -> None:
 
 def test_the_samples_arrive_and_the_dead_servo_is_an_error(service: Service, folder: Path) -> None:
     one = bridge.Bridge(offbd.Client(service.url), "rig", "s")
+    one.refresh()
     assert [d.level for d in one.diagnoses()] == [bridge.STALE] * 4, "no such asset yet"
     client = offbd.Client(service.url)
     client.put_asset("rig", {})
@@ -51,6 +55,7 @@ def test_the_samples_arrive_and_the_dead_servo_is_an_error(service: Service, fol
     recording = client.recording(session["id"])
     keys = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"]
     assert [[s[k] for k in keys] for s in recording] == [[r.get(k) for k in keys] for r in rows]
+    one.refresh()
     levels = {d.name: d.level for d in one.diagnoses()}
     # Not STALE, which is a higher number: after the last sample the verdict is still known.
     assert levels["rig: x servo"] in (bridge.WARN, bridge.ERROR), levels
@@ -76,15 +81,86 @@ def test_samples_wait_while_the_service_is_away_and_the_oldest_is_dropped(servic
     assert (one.n_dropped, one.n_refused) == (1, 0)
 
 
-def test_a_refused_batch_is_counted_and_does_not_stop_the_next(service: Service) -> None:
+def test_a_batch_that_is_refused_for_good_is_counted_and_does_not_stop_the_next(
+    service: Service,
+) -> None:
     client = offbd.Client(service.url)
     client.put_asset("rig", {})
-    one = bridge.Bridge(client, "bad/name?", "s")
+    one = bridge.Bridge(client, "rig", "x" * 300)
     one.position(0.0, 0.0, 0.0)
     with pytest.raises(offbd.ClientError):
         one.deliver()
-    assert one.n_refused == 1 and one.last_refusal
+    assert one.n_refused == 1 and "422" in one.last_refusal
     assert one.deliver() == 0
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        problem("401 Unauthorized", "unauthenticated"),
+        problem("403 Forbidden", "forbidden"),
+        problem("404 Not Found", "not-found"),
+        problem("429 Too Many Requests", "busy"),
+        answered("413 Payload Too Large", "<html>a proxy</html>"),
+        answered("200 OK", "<html>Log in</html>"),
+    ],
+)
+def test_samples_wait_after_an_answer_that_may_change(peer: Peer, answer: bytes) -> None:
+    client = offbd.Client(peer.url, patience_s=0.0)
+    client.put_asset("rig", {})
+    one = bridge.Bridge(client, "rig", "s")
+    for i in range(3):
+        one.position(0.01 * i, 0.0, 0.0)
+    peer.answers = [answer]
+    with pytest.raises(offbd.ClientError):
+        one.deliver()
+    assert (one.deliver(), one.n_refused) == (3, 0)
+
+
+def test_after_the_end_of_its_session_the_samples_go_to_another_one(peer: Peer) -> None:
+    client = offbd.Client(peer.url, patience_s=0.0)
+    client.put_asset("rig", {})
+    one = bridge.Bridge(client, "rig", "s")
+    one.position(0.0, 0.0, 0.0)
+    deliver_all(one)
+    # This one is stored, but its acknowledgement is lost.
+    one.position(1.0, 0.0, 0.0)
+    peer.answers = [b""]
+    with pytest.raises(offbd.ClientError):
+        one.deliver()
+    assert client.send("rig", one._batch(), session="s").accepted == 1
+    (session,) = client.sessions("rig")
+    client.end_session(session["id"])
+    one.position(2.0, 0.0, 0.0)
+    assert one.deliver() == 1, "the same as before, which is a duplicate"
+    with pytest.raises(offbd.ClientError, match="ended"):
+        one.deliver()
+    deliver_all(one)
+    recorded = {s["name"]: client.recording(s["id"]) for s in client.sessions("rig")}
+    assert {name: [s["seq"] for s in rows] for name, rows in recorded.items()} == {
+        "s": [0, 1],
+        "s-2": [2],
+    }
+    assert (one.n_refused, one.session) == (0, "s-2")
+
+
+def test_a_network_that_swallows_packets_does_not_hold_up_the_executor(peer: Peer) -> None:
+    client = offbd.Client(peer.url, patience_s=0.0)
+    client.put_asset("rig", {})
+    one = bridge.Bridge(client, "rig", "s")
+    one.refresh()
+    assert [d.level for d in one.diagnoses()] == [bridge.OK] * 4
+    peer.answers = [None]
+    asking = threading.Thread(target=one.refresh, daemon=True)
+    asking.start()
+    while not peer.silent:
+        time.sleep(0.001)
+    assert len(one.diagnoses()) == 4
+    assert asking.is_alive(), "it still waits for an answer"
+    peer.silent[0].shutdown(socket.SHUT_RDWR)
+    asking.join()
+    one._known = (one._known[0] - bridge.FRESH_S, one._known[1])
+    assert [d.level for d in one.diagnoses()] == [bridge.STALE] * 4
 
 
 @pytest.mark.parametrize(

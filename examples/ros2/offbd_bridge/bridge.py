@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
+import time
 from collections import deque
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -13,6 +15,8 @@ from offbd import Client, ClientError
 CAPACITY = 100_000
 # Samples that are sent in one request.
 BATCH = 500
+# Faults that are known are shown for so long without a newer answer, s.
+FRESH_S = 5.0
 
 # Levels of diagnostic_msgs/DiagnosticStatus.
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
@@ -39,13 +43,16 @@ class Bridge:
 
     A sample is a measured position with the last command before it. Samples wait in memory until
     the service has acknowledged that they are stored, and are sent again until then. If more than
-    `capacity` wait, the oldest is dropped and counted in `n_dropped`.
+    `capacity` wait, the oldest is dropped and counted in `n_dropped`. What the service refuses for
+    good is counted in `n_refused`. If the session has ended, the next samples go to another one,
+    `SESSION-2` and so on.
     """
 
     def __init__(self, client: Client, asset: str, session: str, capacity: int = CAPACITY) -> None:
         self.client = client
         self.asset = asset
         self.session = session
+        self._sessions = (f"{session}-{n}" for n in itertools.count(2))
         self.n_dropped = 0
         self.n_refused = 0
         self.last_refusal = ""
@@ -53,7 +60,11 @@ class Bridge:
         self._command: tuple[float | None, float | None] = (None, None)
         self._seq = 0
         self._waiting: deque[dict[str, Any]] = deque()
+        # The last sample of a batch of which it is not known whether it is stored.
+        self._attempted: int | None = None
         self._changed = threading.Condition()
+        self._known: tuple[float, list[Diagnosis]] | None = None
+        self._reason = "not asked yet"
 
     def command(self, qx_rad: float, qy_rad: float) -> None:
         """Takes a command of the plate's angles."""
@@ -80,31 +91,51 @@ class Bridge:
         """Sends the samples that wait, oldest first, and returns their number once they are stored.
 
         Raises ClientError if the service refuses them, or cannot be reached for as long as the
-        client is patient. In the second case they go on waiting.
+        client is patient. Unless it has refused them for good, they go on waiting.
         """
-        with self._changed:
-            batch = [self._waiting[i] for i in range(min(BATCH, len(self._waiting)))]
+        batch = self._batch()
         if not batch:
             return 0
+        last_seq = self._attempted = batch[-1]["seq"]
         try:
             answer = self.client.send(self.asset, batch, session=self.session)
         except ClientError as error:
-            if error.status is not None and 400 <= error.status < 500:
+            if error.session_ended:
+                self.session = next(self._sessions)
+            elif error.is_final:
                 self._refused(len(batch), str(error))
-                self._forget(batch[-1]["seq"])
+                self._forget(last_seq)
             raise
         for _, reason in answer.rejected:
             self._refused(1, reason)
-        self._forget(batch[-1]["seq"])
+        self._forget(last_seq)
         return len(batch)
 
-    def diagnoses(self) -> list[Diagnosis]:
-        """Asks for the faults of the asset; without an answer all are stale."""
+    def _batch(self) -> list[dict[str, Any]]:
+        """The samples to send: the same as at the last attempt, if its outcome is not known, so
+        that those that are stored already are not sent to another session."""
+        with self._changed:
+            batch = list(itertools.islice(self._waiting, BATCH))
+        again = [s for s in batch if self._attempted is not None and s["seq"] <= self._attempted]
+        return again or batch
+
+    def refresh(self) -> None:
+        """Asks for the faults of the asset, which may take long on a bad network."""
         try:
             faults = list(self.client.faults(self.asset))
         except ClientError as error:
-            return [self._diagnosis(STALE, code, str(error)) for code in CODES]
-        return self.of_faults(faults)
+            self._reason = str(error)
+            return
+        self._known = (time.monotonic(), self.of_faults(faults))
+
+    def diagnoses(self) -> list[Diagnosis]:
+        """Returns the faults as of the last `refresh`, without waiting; if it is old, all are
+        stale.
+        """
+        known = self._known
+        if known is not None and time.monotonic() - known[0] <= FRESH_S:
+            return known[1]
+        return [self._diagnosis(STALE, code, self._reason) for code in CODES]
 
     def of_faults(self, faults: list[dict[str, Any]]) -> list[Diagnosis]:
         """Returns one diagnosis for each fault code from the faults on record."""

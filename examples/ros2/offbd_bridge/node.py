@@ -1,6 +1,7 @@
 """The node: subscribes to the rig, publishes on /diagnostics. The work is done in bridge.py."""
 
 import threading
+import time
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -14,6 +15,8 @@ from offbd_bridge.bridge import Bridge
 
 # The client tries for so long before the node reports that the service is away, s.
 PATIENCE_S = 10.0
+# Pause after an answer that may change, such as that of an asset that is missing, s.
+RETRY_S = 1.0
 DIAGNOSTICS_PERIOD_S = 1.0
 
 
@@ -36,7 +39,8 @@ class OffbdNode(Node):
         session = text["session"] or f"ros-{self.get_clock().now().nanoseconds // 10**9}"
         client = Client(text["url"], token=token, patience_s=PATIENCE_S)
         self.bridge = Bridge(client, text["asset"], session)
-        # The faults are asked for on another connection, so that a lost network delays neither.
+        # The faults are asked for in another thread, so that a lost network delays neither the
+        # samples nor the executor.
         self.reader = Bridge(
             Client(text["url"], token=token, patience_s=0.0), text["asset"], session
         )
@@ -45,6 +49,7 @@ class OffbdNode(Node):
         self.diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(DIAGNOSTICS_PERIOD_S, self.publish)
         threading.Thread(target=self.send, daemon=True).start()
+        threading.Thread(target=self.read, daemon=True).start()
 
     def on_command(self, message):
         angles = dict(zip(message.name, message.position, strict=False))
@@ -63,6 +68,13 @@ class OffbdNode(Node):
                     self.bridge.deliver()
                 except ClientError as error:
                     self.get_logger().warning(str(error), throttle_duration_sec=10.0)
+                    if error.status is not None and not error.is_final:
+                        time.sleep(RETRY_S)
+
+    def read(self):
+        while rclpy.ok():
+            self.reader.refresh()
+            time.sleep(DIAGNOSTICS_PERIOD_S)
 
     def publish(self):
         array = DiagnosticArray()

@@ -127,3 +127,32 @@ async fn a_lie_about_one_asset_holds_up_no_other() {
     agent.drained().await;
     assert_eq!(fixture.client.recording("a", "s").await, samples[..N]);
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_asset_without_an_answer_holds_up_no_other() {
+    let directory = tempfile::tempdir().unwrap();
+    let fixture = ServiceFixture::start().await;
+    let others: Vec<_> = (0..20).map(|n| format!("r{n}")).collect();
+    for asset in others.iter().map(String::as_str).chain(["slow"]) {
+        fixture.client.asset(asset).await;
+    }
+    let proxy = LyingProxy::start(&fixture.client.address).await;
+    let agent = Agent::start(&directory.path().join("spool"), &proxy.url, &[]);
+    let samples = rig(3 * N, usize::MAX);
+    proxy.hold(Some("/assets/slow/"));
+    agent.client.telemetry("slow", Some("s"), &samples).await;
+    eventually(async || (proxy.n_held() == 1).then_some(())).await;
+    for part in samples.chunks(N) {
+        for asset in &others {
+            agent.client.telemetry(asset, Some("s"), part).await;
+        }
+    }
+    eventually(async || (agent.status().await["waiting_batches"] == 1).then_some(())).await;
+    // Its first request is still under way.
+    assert_eq!((proxy.n_held(), proxy.n_passed()), (1, 3 * others.len()));
+    proxy.hold(None);
+    agent.drained().await;
+    for asset in others.iter().map(String::as_str).chain(["slow"]) {
+        assert_eq!(fixture.client.recording(asset, "s").await, samples);
+    }
+}

@@ -13,7 +13,7 @@ use crate::support::process::program;
 use crate::support::{ServiceFixture, batch, csv, eventually, rig};
 
 /// Runs `offbd forward COMMAND --spool SPOOL ARGUMENTS`.
-fn run(spool: &Path, arguments: &[&str]) -> Output {
+pub(super) fn run(spool: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(program());
     command.args(["forward", arguments[0], "--spool"]).arg(spool).args(&arguments[1..]);
     command.output().unwrap()

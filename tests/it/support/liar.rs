@@ -1,4 +1,5 @@
-//! A proxy that answers requests itself, like a captive portal, until it passes them on.
+//! A proxy that answers requests itself, like a captive portal, until it passes them on, or that
+//! holds some of them.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -10,6 +11,7 @@ use axum::http::header::{CONTENT_TYPE, HeaderMap};
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use tokio::net::TcpListener;
+use tokio::sync::watch;
 
 use super::eventually;
 
@@ -27,6 +29,9 @@ struct Lies {
     lie: Mutex<Option<Lie>>,
     n_told: AtomicUsize,
     n_passed: AtomicUsize,
+    /// The part of a path whose requests wait until it is another one.
+    held: watch::Sender<Option<&'static str>>,
+    n_held: AtomicUsize,
     client: reqwest::Client,
 }
 
@@ -40,6 +45,8 @@ impl LyingProxy {
             lie: Mutex::default(),
             n_told: AtomicUsize::default(),
             n_passed: AtomicUsize::default(),
+            held: watch::Sender::default(),
+            n_held: AtomicUsize::default(),
             client: reqwest::Client::new(),
         });
         let router = Router::new().fallback(answer).with_state(lies.clone());
@@ -57,6 +64,16 @@ impl LyingProxy {
         let n_told = || self.lies.n_told.load(Ordering::Relaxed);
         let before = n_told();
         eventually(async || (n_told() >= before + n).then_some(())).await;
+    }
+
+    /// Holds requests to paths with `part` from now on, or none; those that it holds go on then.
+    pub fn hold(&self, part: Option<&'static str>) {
+        self.lies.held.send_replace(part);
+    }
+
+    /// Number of requests that it held.
+    pub fn n_held(&self) -> usize {
+        self.lies.n_held.load(Ordering::Relaxed)
     }
 
     /// Number of requests that were passed on.
@@ -77,6 +94,11 @@ async fn answer(
         lies.n_told.fetch_add(1, Ordering::Relaxed);
         let status = StatusCode::from_u16(status).unwrap();
         return (status, [(CONTENT_TYPE, kind)], body).into_response();
+    }
+    let is_held = |held: &Option<&str>| held.is_some_and(|part| uri.path().contains(part));
+    if is_held(&lies.held.borrow()) {
+        lies.n_held.fetch_add(1, Ordering::Relaxed);
+        lies.held.subscribe().wait_for(|held| !is_held(held)).await.unwrap();
     }
     lies.n_passed.fetch_add(1, Ordering::Relaxed);
     let request = lies.client.request(method, format!("{}{uri}", lies.service));

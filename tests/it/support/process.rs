@@ -67,7 +67,7 @@ impl Process {
 
     /// Sends SIGTERM.
     pub fn terminate(&self) {
-        terminate(&self.child);
+        terminate(&self.child, "-TERM");
     }
 
     /// Starts a service and kills it during its start, after a time that grows with `n`.
@@ -110,7 +110,7 @@ impl Starting {
     /// Sends SIGTERM, and waits until the service has ended.
     pub async fn stop(mut self) -> ExitStatus {
         let child = self.child.as_mut().unwrap();
-        terminate(child);
+        terminate(child, "-TERM");
         ended(child).await
     }
 }
@@ -125,9 +125,10 @@ impl Drop for Starting {
     }
 }
 
-fn terminate(child: &Child) {
+/// Sends `signal`, such as `-TERM`.
+pub fn terminate(child: &Child, signal: &str) {
     let pid = child.id().to_string();
-    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
 }
 
 /// Reads the log on a thread; the address at which the service listens is sent.

@@ -12,14 +12,17 @@ Outcome HttpTransport::send(const char *body, size_t length) {
       connection_.open(host_, port_) && post(body, length) && receive();
   connection_.close();
   if (!answered) return Outcome::Failed;
-  if (status_ >= 200 && status_ < 300) {
+  // Only what the service itself says decides: a proxy or a portal may answer with any status.
+  if (status_ == 200 && strstr(answer_, "\"accepted\":") != nullptr) {
     const char *rejected = strstr(answer_, "\"rejected\":[");
     if (rejected != nullptr && rejected[strlen("\"rejected\":[")] != ']') rejecting_++;
     return Outcome::Stored;
   }
+  if (strstr(answer_, "\"urn:offbd:problem:") == nullptr) return Outcome::Failed;
+  if (strstr(answer_, "\"urn:offbd:problem:session-ended\"") != nullptr) return Outcome::Ended;
   // The document itself is refused. Anything else may pass: a token or an asset that is
   // missing can be added.
-  const bool is_final = status_ == 400 || status_ == 413 || status_ == 415 || status_ == 422;
+  const bool is_final = status_ == 400 || status_ == 409 || status_ == 413 || status_ == 415 || status_ == 422;
   return is_final ? Outcome::Refused : Outcome::Failed;
 }
 
@@ -49,7 +52,6 @@ bool HttpTransport::receive() {
     kept += more;
   }
   answer_[kept] = '\0';
-  // The service acknowledges only what is durable, so the head is enough; but it must be whole.
   const char *end = strstr(answer_, "\r\n\r\n");
   if (strncmp(answer_, "HTTP/1.", 7) != 0 || end == nullptr || kept < 12) return false;
   status_ = atoi(answer_ + 9);

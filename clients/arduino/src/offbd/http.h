@@ -34,7 +34,7 @@ class HttpTransport : public Transport {
 
  private:
   bool post(const char *body, size_t length);
-  // Reads the answer; sets `status_` and returns whether the whole answer has come.
+  // Reads the answer; sets `status_` and returns whether its whole head has come.
   bool receive();
 
   static constexpr size_t HEAD_BYTES = 512;

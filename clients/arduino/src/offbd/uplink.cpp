@@ -71,6 +71,13 @@ void Uplink::send(uint32_t now_ms) {
       refused_++;
       stored(n_sent_);
       return;
+    case Outcome::Ended: {
+      const uint32_t boot = ring_.at(0).boot;
+      part_ = boot == part_boot_ ? part_ + 1 : 2;
+      part_boot_ = boot;
+    }
+    // Tried again after a pause, in case that session has ended as well.
+    [[fallthrough]];
     case Outcome::Failed:
       state_ = State::Pausing;
       delay_ms_ = delay_ms_ == 0 ? FIRST_DELAY_MS : delay_ms_ * 2;
@@ -121,10 +128,16 @@ size_t Uplink::write() {
   return used;
 }
 
-// The clock and the numbers restart with the board, and so does the session.
+// The clock and the numbers restart with the board, and so does the session. A session that
+// somebody has ended goes on in another one, with the number of its part.
 void Uplink::name(char *to, uint32_t boot) const {
-  snprintf(to, NAME_BYTES, "board-%08lx-%lu", static_cast<unsigned long>(ring_.id()),
-           static_cast<unsigned long>(boot));
+  const auto id = static_cast<unsigned long>(ring_.id());
+  const auto start = static_cast<unsigned long>(boot);
+  if (part_ == 1 || boot != part_boot_) {
+    snprintf(to, NAME_BYTES, "board-%08lx-%lu", id, start);
+  } else {
+    snprintf(to, NAME_BYTES, "board-%08lx-%lu-%lu", id, start, static_cast<unsigned long>(part_));
+  }
 }
 
 }  // namespace offbd

@@ -14,6 +14,7 @@ enum class Outcome {
   Waiting,  // sent; the acknowledgement comes by Uplink::acknowledge
   Failed,   // not sent, or refused for a reason that may pass: send it again
   Refused,  // refused for good: the same batch would be refused again
+  Ended,    // the session has ended: its samples belong to another one
 };
 
 // A way to the service.
@@ -27,7 +28,7 @@ class Transport {
 class Uplink {
  public:
   // Longest session name, bytes.
-  static constexpr size_t NAME_BYTES = 32;
+  static constexpr size_t NAME_BYTES = 40;
   // Longest row and frame of a batch as JSON, bytes.
   static constexpr size_t ROW_BYTES = 176;
   static constexpr size_t FRAME_BYTES = 64 + NAME_BYTES;
@@ -79,6 +80,8 @@ class Uplink {
   uint32_t since_ms_ = 0;   // when the state began
   uint32_t delay_ms_ = 0;   // of Pausing; also the last one
   uint32_t n_sent_ = 0;     // samples of the batch that is on its way
+  uint32_t part_ = 1;       // of the session of `part_boot_`
+  uint32_t part_boot_ = 0;
   bool is_repeat_ = false;  // whether the next batch begins like one that was sent before
   uint32_t refused_ = 0;
   uint32_t resent_ = 0;

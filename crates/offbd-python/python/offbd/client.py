@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import http.client
 import json
+import logging
 import random
 import ssl
 import time
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,12 +21,22 @@ MAX_DELAY_S = 30.0
 """Longest delay between two attempts, s."""
 FIRST_DELAY_S = 0.2
 """Delay after the first failed attempt, s; it doubles with each further one."""
+PATIENCE_S = 60.0
+"""Longest time for which a request is sent again, s, if the caller does not say."""
 MAX_BATCH_ROWS = 500
 """Most samples of one request; more are sent in several."""
 NO_CONTENT = 204
 """Status of an answer without content."""
 RETRIED = (408, 425, 429)
 """Statuses below 500 after which a request may succeed unchanged."""
+FINAL = (400, 409, 413, 415, 422)
+"""Statuses with which the service refuses samples for good, as all of its clients see it."""
+PROBLEM_TYPE = "urn:offbd:problem:"
+"""How the types of the service's problems begin."""
+MAX_EXCERPT = 200
+"""Most characters of an answer that an error repeats."""
+
+_log = logging.getLogger("offbd")
 
 
 class ClientError(Exception):
@@ -37,6 +48,22 @@ class ClientError(Exception):
         """The status of the answer; None without an answer."""
         self.problem = problem
         """The problem document (RFC 9457) of the answer, if it has one."""
+
+    @property
+    def is_final(self) -> bool:
+        """Whether the service itself has refused what was sent, and would refuse it again.
+        Anything else may pass: an asset or a token may come, and what a proxy answers says
+        nothing about the samples.
+        """
+        return self.status in FINAL and self._kind().startswith(PROBLEM_TYPE)
+
+    @property
+    def session_ended(self) -> bool:
+        """Whether the session has ended: new samples belong to another one."""
+        return self._kind() == PROBLEM_TYPE + "session-ended"
+
+    def _kind(self) -> str:
+        return str(self.problem.get("type", "")) if isinstance(self.problem, dict) else ""
 
 
 @dataclass
@@ -66,8 +93,9 @@ class Event:
 class Client:
     """Talks to the service at `url`, with a bearer token if one is given.
 
-    A request that fails for a reason that may pass (no connection, 408, 425, 429, 5xx) is
-    sent again with growing delays, for `patience_s` seconds at most; None means for ever.
+    A request that fails for a reason that may pass (no connection, 408, 425, 429, 5xx, an
+    answer that is not the service's) is sent again with growing delays, for `patience_s`
+    seconds at most; None means for ever. Each such failure is a warning of the logger `offbd`.
     Sent telemetry is idempotent: a sample that arrives twice is stored once.
     """
 
@@ -76,7 +104,7 @@ class Client:
         url: str = "http://127.0.0.1:8087",
         *,
         token: str | None = None,
-        patience_s: float | None = None,
+        patience_s: float | None = PATIENCE_S,
         context: ssl.SSLContext | None = None,
     ) -> None:
         scheme = urllib.parse.urlsplit(url).scheme
@@ -111,7 +139,8 @@ class Client:
             body: dict[str, Any] = {"samples": batch}
             if session is not None:
                 body["session"] = session
-            answer = self._object("POST", f"/assets/{_part(asset)}/telemetry", body)
+            path = f"/assets/{_part(asset)}/telemetry"
+            answer = self._object("POST", path, body, _acknowledges(len(batch)))
             total.accepted += answer["accepted"]
             total.duplicate += answer["duplicate"]
             total.rejected += [(n_sent + row["index"], row["reason"]) for row in answer["rejected"]]
@@ -225,11 +254,15 @@ class Client:
                         after, delay_s = event_id, FIRST_DELAY_S
                         if kind == "fault":
                             yield Event(event_id, json.loads(data))
+                reason = "the answer has ended"
             except urllib.error.HTTPError as error:
+                failure = _refusal(error)
                 if not _may_pass(error.code):
-                    raise _refusal(error) from None
-            except (OSError, http.client.HTTPException):
-                pass
+                    raise failure from None
+                reason = str(failure)
+            except (OSError, http.client.HTTPException) as error:
+                reason = _named(error)
+            _log.warning("events of %s: %s; asking again", self._base, reason)
             time.sleep(delay_s * random.uniform(0.8, 1.2))
             delay_s = min(2 * delay_s, MAX_DELAY_S)
 
@@ -243,34 +276,51 @@ class Client:
             if cursor is None:
                 return
 
-    def _object(self, method: str, path: str, body: Any = None) -> dict[str, Any]:
+    def _object(
+        self,
+        method: str,
+        path: str,
+        body: Any = None,
+        is_expected: Callable[[Any], bool] = lambda value: isinstance(value, dict),
+    ) -> dict[str, Any]:
         """Sends a request until it succeeds; returns the JSON object of the answer."""
         content = None if body is None else json.dumps(body).encode()
-        value: dict[str, Any] = self._answer(method, path, content)
+        value: dict[str, Any] = self._answer(method, path, content, is_expected=is_expected)
         return value
 
     def _answer(
-        self, method: str, path: str, content: bytes | None = None, kind: str = "application/json"
+        self,
+        method: str,
+        path: str,
+        content: bytes | None = None,
+        kind: str = "application/json",
+        is_expected: Callable[[Any], bool] = lambda value: True,
     ) -> Any:
         """Sends a request with content of the media type `kind` until it succeeds; returns the
-        JSON of the answer, None if it has no content.
+        JSON of the answer, None if it has no content. An answer that is not expected is not
+        the service's.
         """
-        end = None if self._patience_s is None else time.monotonic() + self._patience_s
+        start = time.monotonic()
         delay_s = FIRST_DELAY_S
         while True:
             try:
                 with self._open(method, path, content, kind) as answer:
-                    return None if answer.status == NO_CONTENT else json.load(answer)
+                    return _value(answer, is_expected)
             except urllib.error.HTTPError as error:
                 failure = _refusal(error)
                 if not _may_pass(error.code):
                     raise failure from None
                 delay_s = max(delay_s, _retry_after_s(error))
             except (OSError, http.client.HTTPException, ValueError) as error:
-                failure = ClientError(f"{method} {self._base}{path}: {error}")
+                failure = ClientError(_named(error))
             pause_s = delay_s * random.uniform(0.8, 1.2)
-            if end is not None and time.monotonic() + pause_s > end:
-                raise failure
+            waited_s = time.monotonic() - start
+            if self._patience_s is not None and waited_s + pause_s > self._patience_s:
+                text = f"{method} {self._base}{path}: tried for {waited_s:.0f} s: {failure}"
+                raise ClientError(text, failure.status, failure.problem)
+            _log.warning(
+                "%s %s%s: %s; trying again in %.1f s", method, self._base, path, failure, pause_s
+            )
             time.sleep(pause_s)
             delay_s = min(2 * delay_s, MAX_DELAY_S)
 
@@ -316,13 +366,54 @@ def _may_pass(status: int) -> bool:
     return status in RETRIED or status >= 500
 
 
+def _acknowledges(n_sent: int) -> Callable[[Any], bool]:
+    """Returns what tells an acknowledgement of so many samples from any other answer."""
+
+    def is_acknowledgement(value: Any) -> bool:
+        try:
+            n_told = value["accepted"] + value["duplicate"] + len(value["rejected"])
+            return bool(n_told == n_sent) and {"session", "session_id"} <= value.keys()
+        except (TypeError, KeyError, AttributeError):
+            return False
+
+    return is_acknowledgement
+
+
+def _value(answer: Any, is_expected: Callable[[Any], bool]) -> Any:
+    """Returns the JSON of an answer; ValueError if it is not one that is expected."""
+    if answer.status == NO_CONTENT:
+        return None
+    text = answer.read()
+    try:
+        value = json.loads(text)
+        if is_expected(value):
+            return value
+    except ValueError:
+        pass
+    told = _excerpt(text.decode(errors="replace"))
+    raise ValueError(f"{answer.status} {answer.reason}, but not an answer of offbd: {told}")
+
+
+def _named(error: Exception) -> str:
+    """An error in words, also one that has none."""
+    return str(error) or type(error).__name__
+
+
+def _excerpt(text: str) -> str:
+    text = " ".join(text.split())
+    return text if len(text) <= MAX_EXCERPT else text[:MAX_EXCERPT] + "…"
+
+
 def _refusal(error: urllib.error.HTTPError) -> ClientError:
-    text = error.read().decode(errors="replace")
+    try:
+        text = error.read().decode(errors="replace")
+    except (OSError, http.client.HTTPException):
+        text = ""
     try:
         problem = json.loads(text)
         detail = problem.get("detail") or problem.get("title")
     except (ValueError, AttributeError):
-        problem, detail = None, text
+        problem, detail = None, _excerpt(text)
     return ClientError(f"{error.code} {error.reason}: {detail}", error.code, problem)
 
 
