@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Learn a rig", &["calibrate", "drive-cycle"]),
     (
         "Run the service",
-        &["serve", "forward", "watch", "check", "health", "token", "backup", "restore", "migrate"],
+        &["serve", "forward", "watch", "check", "token", "backup", "restore", "migrate"],
     ),
     ("Laboratory", &["scene", "chart", "score", "soak"]),
     ("Shell", &["completions", "man", "help"]),
