@@ -175,3 +175,11 @@ async fn a_warning_says_that_the_mqtt_port_of_a_nats_server_keeps_nothing() {
         assert_eq!(log.await.contains("at QoS 1"), telemetry == "false");
     }
 }
+
+/// A broker is reached over TLS if its certificate comes from those that are named.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broker_is_reached_over_tls() {
+    let mosquitto = Mosquitto::start_encrypted();
+    let fixture = start_with(|config| config.mqtt = Some(mosquitto.encrypted_config())).await;
+    connected(&fixture.client, "mqtt").await;
+}
