@@ -9,7 +9,7 @@ use axum::body::Bytes;
 use offbd::config::{Config, MqttConfig};
 use offbd::server;
 use offbd_core::vocabulary::Sample;
-use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, Packet, QoS};
+use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, Packet, PublishOptions, QoS};
 use tokio::time::timeout;
 
 use crate::client::Client;
@@ -92,9 +92,9 @@ struct MqttDevice {
 
 impl MqttDevice {
     async fn connect(port: u16, round: usize, n: usize) -> Result<Self> {
-        let mut options = MqttOptions::new(format!("d{round}x{n}"), "127.0.0.1", port);
+        let mut options = MqttOptions::new(format!("d{round}x{n}"), ("127.0.0.1", port));
         options.set_max_packet_size(1 << 20, 1 << 20);
-        let (client, mut events) = AsyncClient::new(options, 10 * WINDOW);
+        let (client, mut events) = AsyncClient::builder(options).capacity(10 * WINDOW).build();
         client.subscribe(format!("offbd/v1/device-{n}/ack"), QoS::AtMostOnce).await?;
         while !matches!(events.poll().await?, Event::Incoming(Packet::SubAck(_))) {}
         let topic = format!("offbd/v1/device-{n}/telemetry");
@@ -139,7 +139,8 @@ impl MqttDevice {
 
     async fn publish(&mut self, body: Bytes) -> Result<()> {
         if !self.is_lost() {
-            self.client.publish_bytes(&self.topic, QoS::AtMostOnce, false, body).await?;
+            let options = PublishOptions::at_most_once();
+            self.client.publish(&self.topic, body, options).await?;
         }
         Ok(())
     }

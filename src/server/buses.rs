@@ -19,6 +19,12 @@ pub(super) async fn start(
 ) -> Result<Vec<JoinHandle<()>>> {
     #[allow(unused_mut, reason = "without these features there is no bus")]
     let mut buses = Vec::new();
+    if config.nats.is_some() && config.mqtt.as_ref().is_some_and(|mqtt| !mqtt.telemetry) {
+        tracing::warn!(
+            "a NATS server keeps nothing for offbd that devices publish over its MQTT port at \
+             QoS 1: each must send a batch again until offbd's own acknowledgement"
+        );
+    }
     #[cfg(feature = "mqtt")]
     if let Some(mqtt) = &config.mqtt {
         let settings = mqtt::settings(mqtt, config.cluster.as_ref())?;

@@ -14,11 +14,13 @@ mod retained;
 mod verdict;
 
 use crate::support::broker::{Mosquitto, Nats};
-use crate::support::{Client, ServiceFixture, config};
+use crate::support::process::Process;
+use crate::support::{Client, ServiceFixture, config, eventually};
 use offbd::config::Config;
 use offbd::server;
 use serde_json::json;
 use std::ops::{Deref, DerefMut};
+use std::path::Path;
 use tokio::sync::{Mutex, MutexGuard};
 
 /// A service with a bus. The metrics of a process are those of all services in it: one of
@@ -68,7 +70,7 @@ async fn connected(client: &Client, bus: &str) {
 
 /// Waits until a metric has a value, and returns it.
 async fn metric(client: &Client, series: &str, wanted: impl Fn(f64) -> bool) -> f64 {
-    crate::support::eventually(async || {
+    eventually(async || {
         let text = client.get("/metrics").await.text;
         let line = text.lines().find_map(|line| line.strip_prefix(&format!("{series} ")));
         // A counter that was never counted is not there.
@@ -154,5 +156,30 @@ async fn a_broker_that_is_away_is_waited_for() {
     nats.restart();
     mosquitto.restart();
     connected(&fixture.client, "nats").await;
+    connected(&fixture.client, "mqtt").await;
+}
+
+/// What devices over the MQTT port of a NATS server must do is said at the start.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_warning_says_that_the_mqtt_port_of_a_nats_server_keeps_nothing() {
+    let (nats, mqtt) = (Path::new("nats://127.0.0.1:1"), Path::new("mqtt://127.0.0.1:1"));
+    let urls = [("OFFBD_NATS__URL", nats), ("OFFBD_MQTT__URL", mqtt)];
+    for telemetry in ["false", "true"] {
+        let data = tempfile::tempdir().unwrap();
+        let telemetry_is = ("OFFBD_MQTT__TELEMETRY", Path::new(telemetry));
+        let service = Process::start_with(data.path(), &[urls[0], urls[1], telemetry_is]);
+        // Logged after it, if at all.
+        let log = eventually(async || {
+            Some(service.log()).filter(|log| log.contains("cannot connect to the NATS server"))
+        });
+        assert_eq!(log.await.contains("at QoS 1"), telemetry == "false");
+    }
+}
+
+/// A broker is reached over TLS if its certificate comes from those that are named.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broker_is_reached_over_tls() {
+    let mosquitto = Mosquitto::start_encrypted();
+    let fixture = start_with(|config| config.mqtt = Some(mosquitto.encrypted_config())).await;
     connected(&fixture.client, "mqtt").await;
 }

@@ -1,14 +1,17 @@
 //! Messages of devices: from a message to a batch, from a batch to its answer.
 
 use std::future::Future;
+use std::mem::replace;
 use std::sync::Arc;
 
-use futures_util::future::BoxFuture;
+use futures_util::StreamExt;
 use futures_util::stream::FuturesUnordered;
-use futures_util::{FutureExt, StreamExt};
 use hyper::body::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::time::sleep;
 
+use super::batch_id::{batch_id, is_msgpack};
+use super::held::Held;
 use super::presence::Attendance;
 use super::{MAX_PENDING, MAX_QUEUED, MAX_QUEUED_BYTES, count};
 use offbd_http::{Forwarder, MessageOutcome, Problem};
@@ -17,17 +20,23 @@ use offbd_wire::bus::{BatchAckView, BatchRefusalView, DeviceTopic};
 use offbd_wire::mapping::MappedTopic;
 use offbd_wire::telemetry::{self, AckView, Batch, BatchError};
 
-/// A batch of a device that waits to be parsed.
+/// Why a batch is refused if there is no room for it.
+const BUSY: ServiceError = ServiceError::Busy { what: "too many messages wait to be parsed" };
+
+/// A batch of a device that waits to be parsed, or is tried again.
 pub(super) struct Delivery<R> {
     pub(super) asset: String,
     pub(super) form: Form,
     pub(super) payload: Bytes,
     /// What the bus needs to answer.
     pub(super) receipt: R,
-    /// Whether to wait for room instead of refusing the batch.
+    /// Whether the bus keeps the batch until it is settled: it waits for room, and is tried again
+    /// if it is refused only for the moment.
     pub(super) waits: bool,
-    /// Counts the bytes of the payload.
-    room: OwnedSemaphorePermit,
+    /// Counts the bytes of the payload while the batch waits.
+    room: Option<OwnedSemaphorePermit>,
+    /// Whether the batch has been tried.
+    is_tried: bool,
 }
 
 /// A message of a device.
@@ -57,8 +66,17 @@ impl Form {
     /// Parses a batch of at most `limit` samples.
     fn batch(&self, payload: &[u8], limit: usize) -> Result<Batch, BatchError> {
         match self {
-            Self::Own => parse(payload, limit),
+            Self::Own if is_msgpack(payload) => telemetry::msgpack(payload, limit),
+            Self::Own => telemetry::json(payload, limit),
             Self::Mapped(topic) => topic.batch(payload, limit),
+        }
+    }
+
+    /// Returns the id of a batch that is not taken; `None` if it has none or cannot be read.
+    fn id(&self, payload: &[u8]) -> Option<String> {
+        match self {
+            Self::Own => batch_id(payload),
+            Self::Mapped(_) => None,
         }
     }
 }
@@ -80,7 +98,6 @@ impl BatchAnswer {
     }
 
     /// Seconds after which the batch is to be sent again, if that can help.
-    #[cfg(feature = "mqtt")]
     pub(super) const fn retry_after_s(&self) -> Option<u64> {
         match self {
             Self::Taken(_) => None,
@@ -131,15 +148,32 @@ pub(super) enum MessageReply {
     Again,
 }
 
-/// The reply to a message, with its asset and receipt, once it is known.
-type PendingReply<R> = BoxFuture<'static, (String, R, MessageReply)>;
+impl MessageReply {
+    /// Whether another attempt may give another reply.
+    const fn is_temporary(&self) -> bool {
+        match self {
+            Self::Answer(answer) => answer.retry_after_s().is_some(),
+            Self::Nothing => false,
+            Self::Again => true,
+        }
+    }
+}
+
+/// What has become of an attempt to have a batch stored.
+struct Attempt<R> {
+    /// In order of arrival.
+    number: u64,
+    delivery: Delivery<R>,
+    reply: MessageReply,
+}
 
 /// How a bus answers a message.
 pub(super) trait Answering: Send + Sync {
     /// What it needs for this, besides the asset.
-    type Receipt: Send + 'static;
+    type Receipt: Clone + Send + 'static;
 
-    /// Sends the answer to a message.
+    /// Sends the answer to a message. A batch that the bus keeps, and that is refused only for
+    /// the moment, is answered once more.
     fn answer(
         &self,
         asset: &str,
@@ -173,8 +207,9 @@ impl Intake {
         count(self.bus, outcome, 1);
     }
 
-    /// Queues a batch. Returns the reply with the receipt if the batch is too long, the queue is
-    /// full, or the message is a presence, which is not queued here.
+    /// Queues a batch. Returns the reply with the receipt if the owner of the asset takes it, the
+    /// batch is too long, the queue is full, or the message is a presence, which is not queued
+    /// here.
     pub(super) fn queue<R>(
         &self,
         queue: &mpsc::Sender<Delivery<R>>,
@@ -190,27 +225,47 @@ impl Intake {
                 return Err((asset, receipt, Box::new(MessageReply::Nothing)));
             }
         };
-        let limit = self.service.limits().requests.batch_bytes;
-        if payload.len() > limit {
-            let error = ServiceError::TooMany { what: "bytes in one message", limit };
-            return Err((asset, receipt, Box::new(self.refused(error))));
+        // Each node of a cluster gets the message, and the owner alone answers it.
+        let is_owner = self.service.route(&asset) == Route::Here;
+        if !is_owner {
+            self.count(MessageOutcome::Elsewhere);
+            if !waits {
+                return Err((asset, receipt, Box::new(MessageReply::Nothing)));
+            }
         }
-        let busy = ServiceError::Busy { what: "too many messages wait to be parsed" };
-        let size = u32::try_from(payload.len()).unwrap_or(u32::MAX);
-        let Ok(room) = self.bytes.clone().try_acquire_many_owned(size) else {
-            return Err((asset, receipt, Box::new(self.refused(busy))));
+        let room = match self.admit(&payload) {
+            Ok(room) => Some(room),
+            Err(error) => {
+                let reply = self.refused(is_owner, form.id(&payload), error);
+                return Err((asset, receipt, Box::new(reply)));
+            }
         };
-        let delivery = Delivery { asset, form, payload, receipt, waits, room };
+        let delivery = Delivery { asset, form, payload, receipt, waits, room, is_tried: false };
         queue.try_send(delivery).map_err(|error| {
-            let delivery = error.into_inner();
-            (delivery.asset, delivery.receipt, Box::new(self.refused(busy)))
+            let Delivery { asset, form, payload, receipt, .. } = error.into_inner();
+            (asset, receipt, Box::new(self.refused(is_owner, form.id(&payload), BUSY)))
         })
     }
 
-    fn refused(&self, error: ServiceError) -> MessageReply {
-        let answer = BatchAnswer::of(None, Err(error.into()));
-        self.count(answer.outcome());
-        MessageReply::Answer(answer)
+    /// Returns room for a batch that is not too long.
+    fn admit(&self, payload: &Bytes) -> Result<OwnedSemaphorePermit, ServiceError> {
+        let limit = self.service.limits().requests.batch_bytes;
+        if payload.len() > limit {
+            return Err(ServiceError::TooMany { what: "bytes in one message", limit });
+        }
+        let size = u32::try_from(payload.len()).unwrap_or(u32::MAX);
+        self.bytes.clone().try_acquire_many_owned(size).map_err(|_| BUSY)
+    }
+
+    /// Returns the reply to a batch that is not queued.
+    fn refused(&self, is_owner: bool, id: Option<String>, error: ServiceError) -> MessageReply {
+        let answer = BatchAnswer::of(id, Err(error.into()));
+        if is_owner {
+            self.count(answer.outcome());
+            return MessageReply::Answer(answer);
+        }
+        // The bus keeps it for the owner, which has got it too, unless it was not there.
+        if answer.retry_after_s().is_some() { MessageReply::Again } else { MessageReply::Nothing }
     }
 
     /// Answers the batches of the queue until it is closed, and checks presences meanwhile.
@@ -231,76 +286,123 @@ impl Intake {
         bus: &A,
         mut queue: mpsc::Receiver<Delivery<A::Receipt>>,
     ) {
-        let mut pending = FuturesUnordered::new();
-        let mut open = true;
+        let (mut pending, mut pauses) = (FuturesUnordered::new(), FuturesUnordered::new());
+        let (mut held, mut n_arrived, mut open) = (Held::default(), 0, true);
         while open || !pending.is_empty() {
             tokio::select! {
                 delivery = queue.recv(), if open && pending.len() < MAX_PENDING => match delivery {
                     Some(delivery) => {
-                        if let Some(answer) = self.take(bus, delivery).await {
-                            pending.push(answer);
+                        n_arrived += 1;
+                        let asset = delivery.asset.clone();
+                        if let Some(delivery) = held.join(&asset, n_arrived, delivery) {
+                            pending.push(self.clone().attempt(n_arrived, delivery));
                         }
                     }
                     None => open = false,
                 },
-                Some((asset, receipt, reply)) = pending.next(), if !pending.is_empty() => {
-                    if let MessageReply::Answer(answer) = &reply {
-                        self.count(answer.outcome());
+                Some(attempt) = pending.next(), if !pending.is_empty() => {
+                    let (asset, number) = (attempt.delivery.asset.clone(), attempt.number);
+                    let kept = self.conclude(bus, attempt).await;
+                    if let Some(delivery) = kept {
+                        let pause = held.keep(&asset, number, delivery);
+                        pauses.extend(pause.map(|pause| async move {
+                            sleep(pause).await;
+                            asset
+                        }));
+                    } else if open
+                        && let Some((number, delivery)) = held.settle(&asset, number)
+                    {
+                        pending.push(self.clone().attempt(number, delivery));
                     }
-                    bus.answer(&asset, receipt, reply).await;
+                }
+                Some(asset) = pauses.next(), if open && !pauses.is_empty() => {
+                    let due = held.due(&asset);
+                    pending.extend(due.map(|(n, delivery)| self.clone().attempt(n, delivery)));
                 }
             }
         }
     }
 
-    /// Submits a batch and returns its pending reply; `None` if there is none.
-    async fn take<A: Answering>(
+    /// Answers a batch. Returns it if it is to be tried again.
+    async fn conclude<A: Answering>(
         &self,
         bus: &A,
-        delivery: Delivery<A::Receipt>,
-    ) -> Option<PendingReply<A::Receipt>> {
-        if self.service.route(&delivery.asset) != Route::Here {
-            return self.pass_on(bus, delivery).await;
+        attempt: Attempt<A::Receipt>,
+    ) -> Option<Delivery<A::Receipt>> {
+        let Attempt { mut delivery, mut reply, .. } = attempt;
+        let is_first = !replace(&mut delivery.is_tried, true);
+        let is_held = delivery.waits && reply.is_temporary();
+        if let MessageReply::Answer(answer) = &reply
+            && (is_first || !is_held)
+        {
+            self.count(answer.outcome());
         }
-        let limit = self.service.limits().requests.batch_samples;
-        let Delivery { asset, form, payload, receipt, waits, room } = delivery;
-        let batch = form.batch(&payload, limit);
-        drop((payload, room));
-        let (id, submitted) = match batch {
-            Err(error) => (None, Err(error.into())),
-            Ok(mut batch) => (batch.id.take(), self.submit(&asset, batch, waits).await),
-        };
-        let answered = async move {
-            let ack = match submitted {
-                Ok(pending) => pending.acknowledged().await,
-                Err(error) => Err(error),
-            };
-            (asset, receipt, MessageReply::Answer(BatchAnswer::of(id, ack.map_err(Problem::from))))
-        };
-        Some(answered.boxed())
+        if is_held && delivery.room.is_none() {
+            delivery.room = self.admit(&delivery.payload).ok();
+        }
+        let is_kept = is_held && delivery.room.is_some();
+        if is_held && !is_kept {
+            reply = MessageReply::Again;
+        }
+        let is_news = is_first && matches!(reply, MessageReply::Answer(_));
+        if is_news || !is_kept {
+            bus.answer(&delivery.asset, delivery.receipt.clone(), reply).await;
+        }
+        is_kept.then_some(delivery)
     }
 
-    /// Handles a message of an asset that another node owns. In a cluster each node gets the
-    /// message, and the owner takes and answers it. A batch that the bus keeps until it is
-    /// acknowledged is sent to the owner as well, which may have failed before it was stored.
-    async fn pass_on<A: Answering>(
-        &self,
-        bus: &A,
-        delivery: Delivery<A::Receipt>,
-    ) -> Option<PendingReply<A::Receipt>> {
-        self.count(MessageOutcome::Elsewhere);
-        let Delivery { asset, form, payload, receipt, waits, .. } = delivery;
+    /// Tries to have a batch stored.
+    async fn attempt<R>(self, number: u64, mut delivery: Delivery<R>) -> Attempt<R> {
         let limit = self.service.limits().requests.batch_samples;
-        let Some(Ok(batch)) = waits.then(|| form.batch(&payload, limit)) else {
-            bus.answer(&asset, receipt, MessageReply::Nothing).await;
-            return None;
+        let batch = delivery.form.batch(&delivery.payload, limit);
+        let reply = if self.service.route(&delivery.asset) == Route::Here {
+            MessageReply::Answer(self.store(&mut delivery, batch).await)
+        } else {
+            self.pass_on(&delivery, batch).await
         };
-        let (service, forwarder) = (self.service.clone(), self.forwarder.clone());
-        let delivered = async move {
-            let is_settled = forwarder.deliver(&service, &asset, &batch).await;
-            (asset, receipt, if is_settled { MessageReply::Nothing } else { MessageReply::Again })
+        Attempt { number, delivery, reply }
+    }
+
+    /// Has a batch stored by this node.
+    async fn store<R>(
+        &self,
+        delivery: &mut Delivery<R>,
+        batch: Result<Batch, BatchError>,
+    ) -> BatchAnswer {
+        let (id, submitted) = match batch {
+            Err(error) => (delivery.form.id(&delivery.payload), Err(error.into())),
+            Ok(mut batch) => {
+                let id = batch.id.take();
+                (id, self.submit(&delivery.asset, batch, delivery.waits).await)
+            }
         };
-        Some(delivered.boxed())
+        delivery.room = None;
+        if !delivery.waits {
+            delivery.payload = Bytes::new();
+        }
+        let ack = match submitted {
+            Ok(pending) => pending.acknowledged().await,
+            Err(error) => Err(error),
+        };
+        BatchAnswer::of(id, ack.map_err(Problem::from))
+    }
+
+    /// Handles a batch of an asset that another node owns, which gets and answers it too. If the
+    /// bus keeps the batch until it is acknowledged, it is sent to the owner as well, which may
+    /// have failed before the batch was stored.
+    async fn pass_on<R>(
+        &self,
+        delivery: &Delivery<R>,
+        batch: Result<Batch, BatchError>,
+    ) -> MessageReply {
+        let Some(batch) = batch.ok().filter(|_| delivery.waits) else {
+            return MessageReply::Nothing;
+        };
+        if self.forwarder.deliver(&self.service, &delivery.asset, &batch).await {
+            MessageReply::Nothing
+        } else {
+            MessageReply::Again
+        }
     }
 
     async fn submit(
@@ -319,13 +421,4 @@ impl Intake {
 /// Returns the queue of one bus.
 pub(super) fn queue<R>() -> (mpsc::Sender<Delivery<R>>, mpsc::Receiver<Delivery<R>>) {
     mpsc::channel(MAX_QUEUED)
-}
-
-/// Parses a batch of a device: MessagePack starts with the tag of a map, with which no JSON
-/// document starts.
-fn parse(payload: &[u8], limit: usize) -> Result<Batch, BatchError> {
-    match payload.first() {
-        Some(0x80..=0x8f | 0xde | 0xdf) => telemetry::msgpack(payload, limit),
-        _ => telemetry::json(payload, limit),
-    }
 }

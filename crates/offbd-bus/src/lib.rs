@@ -10,17 +10,24 @@
 //!
 //! - `intake`: messages to batches, batches to answers;
 //! - `faults`: the events of the service to retained messages;
+//! - `batch_id`: the id of a batch that is refused;
+//! - `held`: batches that cannot be settled at present, while their bus keeps them;
 //! - `presence`: which devices are connected;
 //! - `nats`: a NATS server, with `callout`, by which it asks for the rights of a device, and
 //!   `settings`, the check of its settings;
 //! - `mqtt`: an MQTT broker, with `puback`, the order of its acknowledgements, and
-//!   `mqtt_publisher`, by which faults go there; `marker` finds out which of them it has kept.
+//!   `mqtt_publisher`, by which faults go there; `marker` finds out which of them it has kept, and
+//!   `dialer` shortens what is too long.
 //!
 //! Contains no SQL and no engines, and reads no configuration.
 
+mod batch_id;
 #[cfg(feature = "nats")]
 mod callout;
+#[cfg(feature = "mqtt")]
+mod dialer;
 mod faults;
+mod held;
 mod intake;
 #[cfg(feature = "mqtt")]
 mod marker;
@@ -54,7 +61,8 @@ const MAX_QUEUED: usize = 4096;
 /// message is parsed.
 const MAX_PENDING: usize = 1024;
 
-/// Bytes of messages that wait to be parsed; at the limit as for [`MAX_QUEUED`].
+/// Bytes of messages that wait to be parsed, or to be tried again; at the limit as for
+/// [`MAX_QUEUED`].
 const MAX_QUEUED_BYTES: usize = 64 << 20;
 
 /// Counts messages of a bus by what became of them.

@@ -10,7 +10,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use rumqttc::{AsyncClient, QoS};
+use rumqttc::{AsyncClient, PublishOptions, QoS};
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 use uuid::Uuid;
@@ -45,8 +45,10 @@ impl MarkerInbox {
         let (topic, (question, answer)) = (TopicStyle::Mqtt.marker(), self.open());
         let asked = async {
             // QoS 0, because messages of QoS 1 may wait for others.
-            client.subscribe(&topic, QoS::AtMostOnce).await.ok()?;
-            client.publish(&topic, QoS::AtMostOnce, false, question).await.ok()?;
+            // The client may send the question before the subscription unless this is confirmed.
+            let subscribed = client.subscribe_tracked(&topic, QoS::AtMostOnce).await.ok()?;
+            subscribed.wait_async().await.ok()?;
+            client.publish(&topic, question, PublishOptions::at_most_once()).await.ok()?;
             answer.await.ok()
         };
         let kept = timeout(MARKER_TIMEOUT, asked).await.ok().flatten();

@@ -8,22 +8,23 @@
 use std::future::pending;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use hyper::body::Bytes;
 use rumqttc::{
-    AsyncClient, ConnectionError, EventLoop, MqttOptions, Outgoing, Packet, Publish, QoS,
-    SubscribeFilter, TlsConfiguration, Transport,
+    AckMode, AsyncClient, ConnectionError, EventLoop, MqttOptions, Outgoing, Packet, Publish,
+    PublishOptions, QoS, SubscribeFilter,
 };
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
+use tokio_rustls::TlsConnector;
 use tokio_rustls::rustls::crypto::ring;
 use tokio_rustls::rustls::pki_types::CertificateDer;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
+use super::dialer::{Dialer, PROTOCOL_LENGTH, Shortened};
 use super::faults::publish_faults;
 use super::intake::{
     Answering, BatchAnswer, BusMessage, Delivery, Form, Intake, MessageReply, queue,
@@ -39,12 +40,11 @@ use offbd_wire::mapping::Mapping;
 
 const BUS: &str = "mqtt";
 
-/// Interval of MQTT's own signs of life.
-const KEEP_ALIVE: Duration = Duration::from_secs(20);
+/// Interval of MQTT's own signs of life, seconds.
+const KEEP_ALIVE_S: u16 = 20;
 
-/// Longest packet from the broker, bytes; at a longer one the connection is lost. The broker
-/// must have a lower limit.
-const MAX_PACKET: usize = 32 << 20;
+/// Bytes of a message before its batch, at most: the topic with its length, and a number.
+const BEFORE_BATCH: usize = 2 + 65_535 + 2;
 
 /// Packets that wait to be sent to the broker; at the limit the sender waits.
 const MAX_OUTGOING: usize = 1024;
@@ -88,15 +88,19 @@ pub fn start(
     settings: MqttSettings,
     closing: CancellationToken,
 ) -> Result<JoinHandle<()>, MqttError> {
-    let options = options(&settings)?;
+    // One byte more than a batch may have, so that what is shortened is refused.
+    let batch_bytes = service.limits().requests.batch_bytes;
+    let shortened = Shortened::to(BEFORE_BATCH + batch_bytes + 1);
+    let options = options(&settings, shortened.clone())?;
     metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
-    Ok(tokio::spawn(run(service, settings, options, closing)))
+    Ok(tokio::spawn(run(service, settings, options, shortened, closing)))
 }
 
 async fn run(
     service: Service,
     settings: MqttSettings,
     options: MqttOptions,
+    shortened: Shortened,
     closing: CancellationToken,
 ) {
     let (connected, clients) = watch::channel(None);
@@ -106,25 +110,31 @@ async fn run(
             publish_faults(BUS, service.clone(), publisher, closing.clone()).await;
         }
     };
-    let broker = Broker { service: service.clone(), settings: &settings, connected };
+    let broker = Broker {
+        service: service.clone(),
+        settings: &settings,
+        connected,
+        shortened,
+        long_topics: Reasons::default(),
+    };
     tokio::join!(publishing, broker.stay_connected(options, &closing));
 }
 
-fn options(settings: &MqttSettings) -> Result<MqttOptions, MqttError> {
-    let MqttSettings { host, port, client_id, .. } = settings;
-    let mut options = MqttOptions::new(client_id, host, *port);
-    options.set_keep_alive(KEEP_ALIVE);
+fn options(settings: &MqttSettings, shortened: Shortened) -> Result<MqttOptions, MqttError> {
+    let MqttSettings { host, port, client_id, encrypted, .. } = settings;
+    let mut options = MqttOptions::new(client_id, (host.as_str(), *port));
+    options.set_keep_alive(KEEP_ALIVE_S);
     // The broker keeps messages of QoS 1 while the service is away.
     options.set_clean_session(false);
-    options.set_manual_acks(true);
-    options.set_max_packet_size(MAX_PACKET, MAX_PACKET);
+    options.set_ack_mode(AckMode::Manual);
+    options.set_max_packet_size(shortened.limit(), PROTOCOL_LENGTH);
     if let Some((user, password)) = &settings.user {
-        options.set_credentials(user, password);
+        options.set_credentials(user, password.clone());
     }
-    if settings.encrypted {
-        let tls = TlsConfiguration::Rustls(Arc::new(tls(settings)?));
-        options.set_transport(Transport::tls_with_config(tls));
-    }
+    let tls = encrypted.then(|| tls(settings)).transpose()?;
+    let tls = tls.map(|tls| TlsConnector::from(Arc::new(tls)));
+    let dialer = Dialer { host: host.clone(), port: *port, tls, shortened };
+    options.set_socket_connector(move |_, _| dialer.clone().connect());
     Ok(options)
 }
 
@@ -157,6 +167,9 @@ struct Broker<'a> {
     service: Service,
     settings: &'a MqttSettings,
     connected: watch::Sender<Connected>,
+    shortened: Shortened,
+    /// The topics of messages that were too long.
+    long_topics: Reasons,
 }
 
 impl Broker<'_> {
@@ -164,12 +177,16 @@ impl Broker<'_> {
         let intake = Intake::new(BUS, self.service.clone());
         let reasons = Reasons::default();
         while !closing.is_cancelled() {
-            let (client, events) = AsyncClient::new(options.clone(), MAX_OUTGOING);
-            let connection = Arc::new(MqttConnection::new(client));
+            let client = AsyncClient::builder(options.clone()).capacity(MAX_OUTGOING);
+            let (client, events) = client.build();
+            let (connection, controls) = MqttConnection::new(client);
             let (sender, receiver) = queue();
             let answering = intake.clone().run(&connection, receiver);
             let reading = self.read(&intake, &connection, events, sender, closing);
-            let (reason, ()) = tokio::join!(reading, answering);
+            let reason = tokio::select! {
+                (reason, ()) = async { tokio::join!(reading, answering) } => reason,
+                () = send_controls(&connection.client, controls) => None,
+            };
             if self.connected.send_replace(None).is_some() {
                 reasons.clear();
             }
@@ -214,15 +231,13 @@ impl Broker<'_> {
                 Ok(rumqttc::Event::Incoming(Packet::PubAck(_))) => {
                     connection.link.confirmed.notify_one()
                 }
-                Ok(rumqttc::Event::Incoming(Packet::Publish(publish)))
-                    if publish.topic == marker_topic =>
-                {
-                    connection.link.markers.arrive(&publish.payload);
-                    // A topic of a mapping may be the same, at QoS 1.
-                    connection.acknowledge(connection.arrive(&publish));
-                }
                 Ok(rumqttc::Event::Incoming(Packet::Publish(publish))) => {
-                    if let Some(sender) = &sender {
+                    self.note_if_long(&publish);
+                    if publish.topic == marker_topic.as_bytes() {
+                        connection.link.markers.arrive(&publish.payload);
+                        // A topic of a mapping may be the same, at QoS 1.
+                        connection.acknowledge(connection.arrive(&publish));
+                    } else if let Some(sender) = &sender {
                         self.receive(intake, connection, publish, sender);
                     }
                 }
@@ -263,7 +278,8 @@ impl Broker<'_> {
         sender: &mpsc::Sender<Delivery<MqttReceipt>>,
     ) {
         let receipt = connection.arrive(&publish);
-        let addressed = match self.address(&publish) {
+        let topic = String::from_utf8_lossy(&publish.topic);
+        let addressed = match self.address(&topic, publish.retain) {
             Ok(addressed) => addressed,
             Err(outcome) => {
                 intake.count(outcome);
@@ -274,24 +290,42 @@ impl Broker<'_> {
         let queued = intake.queue(sender, addressed, publish.payload, receipt, waits);
         if let Err((asset, receipt, reply)) = queued {
             match *reply {
-                MessageReply::Answer(answer) => connection.send_now(&asset, receipt, &answer),
+                MessageReply::Answer(answer) => connection.refuse_now(&asset, receipt, &answer),
                 MessageReply::Nothing => connection.acknowledge(receipt),
                 MessageReply::Again => connection.end(),
             }
         }
     }
 
+    /// Logs a message that was too long, one for each topic.
+    fn note_if_long(&self, publish: &Publish) {
+        let Some(bytes) = self.shortened.original(publish) else { return };
+        let topic = String::from_utf8_lossy(&publish.topic);
+        if self.long_topics.is_new(&topic) {
+            tracing::error!(
+                %topic,
+                bytes,
+                "a message over MQTT is longer than `limits.batch_bytes` and is refused; let the \
+                 broker refuse such messages: `message_size_limit` of Mosquitto, \
+                 `max_packet_size` of others"
+            );
+        }
+    }
+
     /// Returns the asset of a message and its content, or the outcome of one that is left out.
-    fn address(&self, publish: &Publish) -> Result<(String, BusMessage), MessageOutcome> {
-        let topic = publish.topic.as_str();
+    fn address(
+        &self,
+        topic: &str,
+        is_retained: bool,
+    ) -> Result<(String, BusMessage), MessageOutcome> {
         if let Some((entry, asset)) = self.settings.mapping.find(topic) {
             let asset = asset.map_err(|error| refused(topic, &error))?;
             let batch = BusMessage::Batch(Form::Mapped(entry));
-            return if publish.retain { Err(MessageOutcome::Retained) } else { Ok((asset, batch)) };
+            return if is_retained { Err(MessageOutcome::Retained) } else { Ok((asset, batch)) };
         }
         let (asset, kind) =
             TopicStyle::Mqtt.parse(topic).map_err(|error| refused(topic, &error))?;
-        if publish.retain && kind == DeviceTopic::Telemetry {
+        if is_retained && kind == DeviceTopic::Telemetry {
             tracing::warn!(topic, "a retained message is no new telemetry; it is ignored");
             return Err(MessageOutcome::Retained);
         }
@@ -307,24 +341,35 @@ fn refused(topic: &str, error: &offbd_wire::bus::TopicError) -> MessageOutcome {
 /// The number of a message of QoS 1 among those of its connection; `None` for QoS 0.
 type MqttReceipt = Option<u64>;
 
+/// What is sent to the broker in this order, and must not be left out.
+enum Control {
+    PubAck(Publish),
+    Disconnect,
+}
+
 /// One connection to a broker.
 struct MqttConnection {
     client: AsyncClient,
     pubacks: Mutex<PubackQueue<Publish>>,
     link: Arc<BrokerLink>,
+    /// No longer than the messages that the broker sends without waiting for acknowledgements,
+    /// of which MQTT can number 65 535.
+    controls: mpsc::UnboundedSender<Control>,
     /// Cancelled if the connection is to be made again at once.
     renew: CancellationToken,
 }
 
 impl MqttConnection {
-    fn new(client: AsyncClient) -> Self {
+    fn new(client: AsyncClient) -> (Arc<Self>, mpsc::UnboundedReceiver<Control>) {
         let link = Arc::new(BrokerLink::new(client.clone()));
-        Self { client, pubacks: Mutex::default(), link, renew: CancellationToken::new() }
+        let (controls, receiver) = mpsc::unbounded_channel();
+        let (pubacks, renew) = (Mutex::default(), CancellationToken::new());
+        (Arc::new(Self { client, pubacks, link, controls, renew }), receiver)
     }
 
     fn arrive(&self, publish: &Publish) -> MqttReceipt {
         let without_payload =
-            Publish { payload: Bytes::new(), topic: String::new(), ..publish.clone() };
+            Publish { payload: Bytes::new(), topic: Bytes::new(), ..publish.clone() };
         let mut pubacks = self.pubacks.lock().unwrap_or_else(PoisonError::into_inner);
         (publish.qos == QoS::AtLeastOnce).then(|| pubacks.arrive(without_payload))
     }
@@ -334,32 +379,40 @@ impl MqttConnection {
         let Some(number) = receipt else { return };
         let mut pubacks = self.pubacks.lock().unwrap_or_else(PoisonError::into_inner);
         for publish in pubacks.complete(number) {
-            if self.client.try_ack(&publish).is_err() {
-                // The broker repeats what was not acknowledged.
-                self.renew.cancel();
-            }
+            self.control(Control::PubAck(publish));
         }
     }
 
-    fn send_now(&self, asset: &str, receipt: MqttReceipt, answer: &BatchAnswer) {
+    fn control(&self, control: Control) {
+        // It fails only when the connection has ended.
+        let _ = self.controls.send(control);
+    }
+
+    /// Refuses a batch that is not queued. The broker repeats it over the next connection if that
+    /// can help.
+    fn refuse_now(&self, asset: &str, receipt: MqttReceipt, answer: &BatchAnswer) {
         let topic = TopicStyle::Mqtt.ack(asset);
         // If there is no room, the device gets no answer and sends its batch again.
-        let _ = self.client.try_publish(topic, QoS::AtMostOnce, false, answer.document());
-        self.conclude(receipt, answer);
-    }
-
-    /// Ends the connection after what is to be sent already, so that it is made again.
-    fn end(&self) {
-        if self.client.try_disconnect().is_err() {
-            self.renew.cancel();
-        }
-    }
-
-    fn conclude(&self, receipt: MqttReceipt, answer: &BatchAnswer) {
+        let _ = self.client.try_publish(topic, answer.document(), PublishOptions::at_most_once());
         match (receipt, answer.retry_after_s()) {
             (Some(_), Some(_)) => self.end(),
             _ => self.acknowledge(receipt),
         }
+    }
+
+    /// Ends the connection after what is to be sent already, so that it is made again.
+    fn end(&self) {
+        self.control(Control::Disconnect);
+    }
+}
+
+async fn send_controls(client: &AsyncClient, mut controls: mpsc::UnboundedReceiver<Control>) {
+    while let Some(control) = controls.recv().await {
+        // It fails only when the connection has ended.
+        let _ = match control {
+            Control::PubAck(publish) => client.ack(&publish).await,
+            Control::Disconnect => client.disconnect_with_timeout(SEND_TIMEOUT).await,
+        };
     }
 }
 
@@ -372,15 +425,17 @@ impl Answering for Arc<MqttConnection> {
             MessageReply::Nothing => return self.acknowledge(receipt),
             MessageReply::Again => return self.end(),
         };
-        let topic = TopicStyle::Mqtt.ack(asset);
-        let sent = self.client.publish(topic, QoS::AtMostOnce, false, answer.document());
+        let (topic, options) = (TopicStyle::Mqtt.ack(asset), PublishOptions::at_most_once());
+        let sent = self.client.publish(topic, answer.document(), options);
         if self.renew.run_until_cancelled(timeout(SEND_TIMEOUT, sent)).await.is_none() {
             return;
         }
-        self.conclude(receipt, &answer);
+        if answer.retry_after_s().is_none() {
+            self.acknowledge(receipt);
+        }
     }
 
     async fn finish(&self) {
-        let _ = timeout(SEND_TIMEOUT, self.client.disconnect()).await;
+        self.end();
     }
 }

@@ -6,7 +6,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use rumqttc::{AsyncClient, QoS};
+use rumqttc::{AsyncClient, PublishOptions};
 use tokio::sync::{Notify, watch};
 use tokio::time::Sleep;
 use tokio_util::sync::CancellationToken;
@@ -42,7 +42,8 @@ impl BrokerLink {
     /// Returns whether the broker has confirmed the message before the connection has ended.
     async fn publish(&self, topic: &str, retained: bool, document: Vec<u8>) -> bool {
         let confirmed = async {
-            let sent = self.client.publish(topic, QoS::AtLeastOnce, retained, document).await;
+            let options = PublishOptions::at_least_once().retain(retained);
+            let sent = self.client.publish(topic, document, options).await;
             if sent.is_err() {
                 // The connection is about to end.
                 pending::<()>().await;
@@ -156,7 +157,7 @@ mod tests {
         let mut publisher = MqttPublisher::new(links);
         assert_eq!(publisher.reconnected().now_or_never(), None);
         let connect_and_end = || {
-            let (client, _) = AsyncClient::new(MqttOptions::new("x", "localhost", 1), 10);
+            let (client, _) = AsyncClient::builder(MqttOptions::new("x", ("localhost", 1))).build();
             let link = Arc::new(BrokerLink::new(client));
             link.ended.cancel();
             sender.send_replace(Some(link));

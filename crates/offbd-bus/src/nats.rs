@@ -341,7 +341,12 @@ async fn noted(event: ClientEvent, connected: Arc<Notify>, reasons: Arc<Reasons>
             tracing::warn!("the connection to the NATS server is lost");
             metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(0.0);
         }
-        ClientEvent::SlowConsumer(_) => count(BUS, MessageOutcome::Dropped, 1),
+        ClientEvent::SlowConsumer(_) => {
+            count(BUS, MessageOutcome::Dropped, 1);
+            if reasons.is_new(&"dropped messages") {
+                tracing::warn!("more messages arrive over NATS than are read; some are dropped");
+            }
+        }
         event if reasons.is_new(&event) => {
             tracing::warn!(%event, "the NATS server reports");
         }

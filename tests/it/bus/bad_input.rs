@@ -1,10 +1,11 @@
 //! What devices must not send: refused in words, counted, and nothing is taken.
 
-use crate::bus::{count, device, metric, with_mosquitto, with_nats};
-use crate::support::broker::{Mosquitto, Nats};
+use crate::bus::{connected, count, device, metric, start_with, with_mosquitto, with_nats};
+use crate::support::broker::{Mosquitto, Nats, mqtt_config};
 use crate::support::bus_device::{BusDevice, MqttDevice, nats, numbered};
+use crate::support::link::Link;
 use crate::support::rig;
-use rumqttc::QoS;
+use rumqttc::{PublishOptions, QoS};
 use serde_json::{Value, json};
 
 fn outcome(bus: &str, outcome: &str) -> String {
@@ -14,7 +15,7 @@ fn outcome(bus: &str, outcome: &str) -> String {
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_bad_batch_is_refused_in_words() {
     let (nats, mosquitto) = (Nats::start(), Mosquitto::start());
-    let fixture = crate::bus::start_with(|config| {
+    let fixture = start_with(|config| {
         config.nats = Some(nats.config());
         config.mqtt = Some(mosquitto.config());
         config.limits.batch_bytes = 100_000;
@@ -23,7 +24,7 @@ async fn a_bad_batch_is_refused_in_words() {
     })
     .await;
     let client = &fixture.client;
-    crate::bus::connected(client, "mqtt").await;
+    connected(client, "mqtt").await;
     let secret = device(client, "a").await;
     let samples = rig(300, 300);
     let over_nats = BusDevice::nats(nats.port, "a", ("a", &secret)).await;
@@ -64,7 +65,7 @@ async fn a_bad_topic_is_counted_and_nothing_is_taken() {
     let mosquitto = Mosquitto::start();
     let fixture = with_mosquitto(&mosquitto).await;
     let client = &fixture.client;
-    crate::bus::connected(client, "mqtt").await;
+    connected(client, "mqtt").await;
     client.asset("a").await;
     let samples = rig(10, 10);
     let mut device = MqttDevice::connect(mosquitto.port, "device", None).await;
@@ -93,6 +94,35 @@ async fn a_bad_topic_is_counted_and_nothing_is_taken() {
     assert_eq!(page["items"], json!([]));
 }
 
+/// A broker without a limit hands over messages of any length, and repeats one of QoS 1 that is
+/// not acknowledged over each further connection.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_message_of_any_length_is_refused_and_others_are_served() {
+    let mosquitto = Mosquitto::start();
+    let (link, port) = Link::to_port(mosquitto.port).await;
+    let fixture = start_with(|config| config.mqtt = Some(mqtt_config(port))).await;
+    let client = &fixture.client;
+    connected(client, "mqtt").await;
+    client.asset("bad").await;
+    client.asset("good").await;
+    let before = count(client, &outcome("mqtt", "too_large")).await;
+    let mut bad = MqttDevice::connect(mosquitto.port, "bad", None).await;
+    bad.subscribe("offbd/v1/bad/ack").await;
+    let mut good = BusDevice::mqtt(mosquitto.port, "good", None).await;
+    for (i, part) in rig(30, 30).chunks(10).enumerate() {
+        let mut long = br#"{"id":"long","note":""#.to_vec();
+        long.resize(40 << 20, b'x');
+        let options = PublishOptions::at_least_once();
+        bad.client.publish("offbd/v1/bad/telemetry", long, options).await.unwrap();
+        let answer: Value = serde_json::from_slice(&bad.next().await.payload).unwrap();
+        assert_eq!((&answer["status"], &answer["id"]), (&json!(413), &json!("long")), "{answer}");
+        let answer = good.ask(numbered(&i.to_string(), part)).await;
+        assert_eq!(answer["accepted"], 10, "{answer}");
+    }
+    assert_eq!(count(client, &outcome("mqtt", "too_large")).await, before + 3.0);
+    assert_eq!(link.n_connections(), 1);
+}
+
 /// What lies on a topic of telemetry since before is not new.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_retained_batch_is_ignored() {
@@ -100,8 +130,7 @@ async fn a_retained_batch_is_ignored() {
     let mut device = MqttDevice::connect(mosquitto.port, "device", None).await;
     let batch = numbered("x", &rig(10, 10));
     let topic = "offbd/v1/a/telemetry";
-    device.client.publish(topic, QoS::AtLeastOnce, true, batch).await.unwrap();
-    device.until(|packet| matches!(packet, rumqttc::Packet::PubAck(_)).then_some(())).await;
+    device.leave(topic, true, batch).await;
     let fixture = with_mosquitto(&mosquitto).await;
     metric(&fixture.client, &outcome("mqtt", "retained"), |n| n >= 1.0).await;
     let page = fixture.client.get("sessions").await.expect(200);
@@ -129,12 +158,13 @@ async fn a_device_is_online_until_its_last_will() {
     metric(client, &outcome("nats", "malformed"), |n| n == before + 3.0).await;
 
     // The last will of a device that vanishes, by MQTT.
-    let mut options = rumqttc::MqttOptions::new("will", "127.0.0.1", server.mqtt_port);
-    options.set_credentials("a", &secret);
+    let mut options = rumqttc::MqttOptions::new("will", ("127.0.0.1", server.mqtt_port));
+    options.set_credentials("a", secret);
     let will = rumqttc::LastWill::new("offbd/v1/a/state", "offline", QoS::AtMostOnce, true);
     options.set_last_will(will);
-    let (device, mut events) = rumqttc::AsyncClient::new(options, 10);
-    device.publish("offbd/v1/a/state", QoS::AtMostOnce, true, "online").await.unwrap();
+    let (device, mut events) = rumqttc::AsyncClient::builder(options).build();
+    let retained = PublishOptions::at_most_once().retained();
+    device.publish("offbd/v1/a/state", "online", retained).await.unwrap();
     let polling = tokio::spawn(async move { while events.poll().await.is_ok() {} });
     metric(client, "offbd_bus_devices_online", |n| n == 1.0).await;
     polling.abort();

@@ -14,8 +14,7 @@ use serde_json::Value;
 pub async fn retained(port: u16, login: Option<(&str, &str)>) -> BTreeMap<String, Value> {
     let mut late = MqttDevice::connect(port, "late", login).await;
     // Of each subscription the retained messages come at once, so that this one is the last.
-    late.client.publish("marker", QoS::AtLeastOnce, true, "x").await.unwrap();
-    late.until(|packet| matches!(packet, rumqttc::Packet::PubAck(_)).then_some(())).await;
+    late.leave("marker", true, "x").await;
     late.subscribe("offbd/v1/+/fault/+").await;
     late.client.subscribe("marker", QoS::AtLeastOnce).await.unwrap();
     let mut found = BTreeMap::new();

@@ -159,17 +159,18 @@ async fn a_new_connection_gets_no_acknowledgement_of_the_previous_one() {
     assert_eq!(fixture.client.recording("a", "s").await, samples[..30]);
 }
 
-/// A batch that cannot be taken at present is not acknowledged; the broker repeats it.
+/// A batch that cannot be taken at present is tried again, before those that follow it, and not
+/// acknowledged until then. Other rigs go on over the same connection.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn a_batch_that_cannot_be_taken_is_asked_for_again() {
+async fn a_batch_that_cannot_be_taken_at_present_is_tried_again() {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-    let _fixture = service(&listener).await;
+    let fixture = service(&listener).await;
     let mut broker = Connection::accept(&listener).await;
     let samples = rig(10, 10);
     // Sessions begin at a limited rate: 429.
     let mut refused = None;
     for number in 1..=300_u16 {
-        let mut document = crate::support::batch(Some(&format!("s{number}")), &samples);
+        let mut document = crate::support::batch(Some(&format!("s{number}")), &samples[..5]);
         document["id"] = serde_json::json!("x");
         broker.publish(number, "offbd/v1/a/telemetry", document.to_string().as_bytes()).await;
         let (kind, body) = broker.packet().await;
@@ -181,19 +182,22 @@ async fn a_batch_that_cannot_be_taken_is_asked_for_again() {
         assert_eq!(broker.puback().await, number);
     }
     let refused = refused.expect("a limit of new sessions");
-    let mut left = Vec::new();
-    let ended = timeout(DEADLINE, broker.socket.read_to_end(&mut left)).await.expect("it ends");
-    assert!(ended.is_err() || !left.contains(&(PUBACK << 4)), "{left:?}");
-    let mut again = 0;
-    loop {
-        again += 1;
-        let mut broker = Connection::accept(&listener).await;
-        broker.publish(9, "offbd/v1/a/telemetry", refused.to_string().as_bytes()).await;
-        let (_, body) = broker.packet().await;
-        if !String::from_utf8_lossy(&body).contains("\"retry_after_s\"") {
-            assert_eq!(broker.puback().await, 9);
-            break;
+    // One that follows it in its session, and one of another rig.
+    let mut next = crate::support::batch(refused["session"].as_str(), &samples[5..]);
+    next["id"] = serde_json::json!("next");
+    broker.publish(301, "offbd/v1/a/telemetry", next.to_string().as_bytes()).await;
+    broker.publish(302, "offbd/v1/b/telemetry", &part(&samples, 0)).await;
+    let (mut numbers, mut answers) = (Vec::new(), Vec::new());
+    while numbers.last() != Some(&302) {
+        match broker.packet().await {
+            (PUBACK, body) => numbers.push(u16::from_be_bytes([body[0], body[1]])),
+            (_, body) => answers.push(String::from_utf8_lossy(&body).into_owned()),
         }
-        assert!(again < 30, "never taken");
     }
+    assert!(numbers.is_sorted() && numbers.len() == 3, "{numbers:?}");
+    assert!(answers.iter().all(|answer| answer.contains("\"accepted\":")), "{answers:?}");
+    let of = |asset: &str| answers.iter().filter(|a| a.contains(&format!("/{asset}/"))).count();
+    assert_eq!((of("a"), of("b")), (2, 1), "{answers:?}");
+    let session = refused["session"].as_str().unwrap();
+    assert_eq!(fixture.client.recording("a", session).await, samples);
 }

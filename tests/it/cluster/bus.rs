@@ -1,13 +1,13 @@
 //! Devices over NATS and a cluster: nodes and servers fail, and nothing is lost or doubled.
 
 use offbd_core::vocabulary::Sample;
-use rumqttc::{Packet, QoS};
 use serde_json::json;
 
 use super::{count, register_rigs};
-use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats, NatsServers};
+use crate::support::broker::{Mosquitto, NATS_PASSWORD, Nats, NatsServers, mqtt_config};
 use crate::support::bus_device::{BusDevice, MqttDevice, numbered};
 use crate::support::cluster::{Cluster, N_NODES, NodeKind};
+use crate::support::link::Link;
 use crate::support::postgres::Postgres;
 use crate::support::{Client, batch, eventually, rig};
 
@@ -132,8 +132,7 @@ pub(super) async fn leave_to_broker(device: &mut MqttDevice, names: &[String], s
         for name in names {
             let topic = format!("offbd/v1/{name}/telemetry");
             let document = batch(Some("s"), part).to_string();
-            device.client.publish(topic, QoS::AtLeastOnce, false, document).await.unwrap();
-            device.until(|packet| matches!(packet, Packet::PubAck(_)).then_some(())).await;
+            device.leave(&topic, false, document).await;
         }
     }
 }
@@ -165,4 +164,55 @@ async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_
     }
     cluster.signal(1, "-CONT");
     cluster.settled(2).await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn batches_of_a_killed_owner_disconnect_no_node_from_the_broker() {
+    let (mosquitto, samples) = (Mosquitto::start(), rig(200, 200));
+    let (link, port) = Link::to_port(mosquitto.port).await;
+    let (mut cluster, names) = start_with(vec![("OFFBD_MQTT__URL", mqtt_config(port).url)]).await;
+    are_connected(&cluster).await;
+    let mut device = MqttDevice::connect(mosquitto.port, "all", None).await;
+    let owned = cluster.owned_by(1, &names).await;
+    leave_to_broker(&mut device, &owned, &samples[..100]).await;
+    cluster.kill(1);
+    leave_to_broker(&mut device, &owned, &samples[100..]).await;
+    cluster.taken_over_from(1).await;
+    for name in &owned {
+        let stored = async || {
+            let stored = cluster.client(0).recording(name, "s").await;
+            (stored.len() >= samples.len()).then_some(stored)
+        };
+        let mut stored = eventually(stored).await;
+        stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+        assert_eq!(stored, samples, "{name}");
+    }
+    assert_eq!(link.n_connections(), N_NODES);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_owner_alone_refuses_a_batch_that_is_too_long_and_names_it() {
+    let nats = Nats::start();
+    let seed = nats.config().issuer_seed.unwrap();
+    let (cluster, names) = start(&nats.config().url, &seed).await;
+    let mut devices = devices(&cluster.client(0), &names[..1], &[nats.port]).await;
+    let mut long = br#"{"id":"long","note":""#.to_vec();
+    long.resize(5 << 20, b'x');
+    let answer = devices[0].ask(long).await;
+    assert_eq!((&answer["status"], &answer["id"]), (&json!(413), &json!("long")), "{answer}");
+    let of_all = async |outcome: &str| {
+        let series = format!("offbd_bus_messages_total{{bus=\"nats\",outcome=\"{outcome}\"}}");
+        let mut n = 0.0;
+        for client in cluster.clients() {
+            n += count(&client, &series).await;
+        }
+        n
+    };
+    // Each node has got it.
+    eventually(async || {
+        let n = of_all("too_large").await + of_all("elsewhere").await;
+        (n >= N_NODES as f64).then_some(())
+    })
+    .await;
+    assert_eq!(of_all("too_large").await, 1.0);
 }

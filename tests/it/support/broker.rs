@@ -237,6 +237,27 @@ impl Mosquitto {
 
     /// Starts a broker with these lines as its list of permitted topics, if there are some.
     pub fn start_with(topics: Option<&str>) -> Self {
+        Self::start_of(|directory| {
+            let list = directory.join("topics");
+            topics.map(|topics| std::fs::write(&list, topics).unwrap());
+            topics.map(|_| format!("acl_file {}", list.display())).into_iter().collect()
+        })
+    }
+
+    /// Starts a broker that is reached over TLS as `localhost`; its certificate is `ca`.
+    pub fn start_encrypted() -> Self {
+        let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+        Self::start_of(|directory| {
+            let (certificate, key) = (directory.join("ca"), directory.join("key"));
+            std::fs::write(&certificate, made.cert.pem()).unwrap();
+            std::fs::write(&key, made.signing_key.serialize_pem()).unwrap();
+            let (certificate, key) = (certificate.display(), key.display());
+            vec![format!("certfile {certificate}"), format!("keyfile {key}")]
+        })
+    }
+
+    /// Starts a broker with further lines in its configuration.
+    pub fn start_of(more: impl FnOnce(&Path) -> Vec<String>) -> Self {
         let directory = tempfile::tempdir().unwrap();
         let port = free_port();
         let mut lines = vec![
@@ -250,11 +271,7 @@ impl Mosquitto {
             "autosave_interval 1".to_owned(),
             "max_queued_messages 0".to_owned(),
         ];
-        if let Some(topics) = topics {
-            let list = directory.path().join("topics");
-            std::fs::write(&list, topics).unwrap();
-            lines.push(format!("acl_file {}", list.display()));
-        }
+        lines.extend(more(directory.path()));
         std::fs::write(directory.path().join("conf"), lines.join("\n") + "\n").unwrap();
         #[cfg(unix)]
         {
@@ -301,6 +318,15 @@ impl Mosquitto {
     /// Returns the section of the service's configuration.
     pub fn config(&self) -> offbd::config::MqttConfig {
         mqtt_config(self.port)
+    }
+
+    /// Returns the same for a broker that is reached over TLS.
+    pub fn encrypted_config(&self) -> offbd::config::MqttConfig {
+        offbd::config::MqttConfig {
+            url: format!("mqtts://localhost:{}", self.port),
+            ca: Some(self.directory.path().join("ca")),
+            ..self.config()
+        }
     }
 
     /// Publishes each line of `input` with the program mosquitto_pub.

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use axum::body::Bytes;
 use futures_util::StreamExt;
-use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, Packet, Publish, QoS};
+use rumqttc::{AsyncClient, Event, EventLoop, MqttOptions, Packet, Publish, PublishOptions, QoS};
 use serde_json::{Value, json};
 use tokio::time::timeout;
 
@@ -13,6 +14,13 @@ use offbd_core::vocabulary::Sample;
 
 /// After this long a device sends a batch again.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(1);
+
+/// A message that a broker has sent.
+pub struct MqttMessage {
+    pub topic: String,
+    pub payload: Bytes,
+    pub retain: bool,
+}
 
 /// A client of a broker.
 pub struct MqttDevice {
@@ -23,13 +31,13 @@ pub struct MqttDevice {
 impl MqttDevice {
     /// Connects to the broker on `port`.
     pub async fn connect(port: u16, id: &str, login: Option<(&str, &str)>) -> Self {
-        let mut options = MqttOptions::new(id, "127.0.0.1", port);
-        options.set_keep_alive(Duration::from_secs(60));
-        options.set_max_packet_size(32 << 20, 32 << 20);
+        let mut options = MqttOptions::new(id, ("127.0.0.1", port));
+        options.set_keep_alive(60);
+        options.set_max_packet_size(64 << 20, 64 << 20);
         if let Some((user, password)) = login {
-            options.set_credentials(user, password);
+            options.set_credentials(user, password.to_owned());
         }
-        let (client, events) = AsyncClient::new(options, 1000);
+        let (client, events) = AsyncClient::builder(options).capacity(1000).build();
         let mut device = Self { client, events };
         device.until(|packet| matches!(packet, Packet::ConnAck(_)).then_some(())).await;
         device
@@ -42,13 +50,24 @@ impl MqttDevice {
     }
 
     pub async fn publish(&self, topic: &str, payload: impl Into<Vec<u8>>) {
-        self.client.publish(topic, QoS::AtMostOnce, false, payload).await.unwrap();
+        let options = PublishOptions::at_most_once();
+        self.client.publish(topic, payload.into(), options).await.unwrap();
+    }
+
+    /// Publishes at QoS 1, and waits until the broker has acknowledged it.
+    pub async fn leave(&mut self, topic: &str, is_retained: bool, payload: impl Into<Vec<u8>>) {
+        let options = PublishOptions::at_least_once().retain(is_retained);
+        self.client.publish(topic, payload.into(), options).await.unwrap();
+        self.until(|packet| matches!(packet, Packet::PubAck(_)).then_some(())).await;
     }
 
     /// Returns the next message.
-    pub async fn next(&mut self) -> Publish {
+    pub async fn next(&mut self) -> MqttMessage {
         self.until(|packet| match packet {
-            Packet::Publish(publish) => Some(publish),
+            Packet::Publish(Publish { topic, payload, retain, .. }) => {
+                let topic = String::from_utf8(topic.to_vec()).unwrap();
+                Some(MqttMessage { topic, payload, retain })
+            }
             _ => None,
         })
         .await
@@ -74,11 +93,11 @@ impl MqttDevice {
 
     /// Returns the error with which the broker ends or refuses the connection.
     pub async fn refusal(port: u16, id: &str, login: Option<(&str, &str)>) -> String {
-        let mut options = MqttOptions::new(id, "127.0.0.1", port);
+        let mut options = MqttOptions::new(id, ("127.0.0.1", port));
         if let Some((user, password)) = login {
-            options.set_credentials(user, password);
+            options.set_credentials(user, password.to_owned());
         }
-        let (_client, mut events) = AsyncClient::new(options, 10);
+        let (_client, mut events) = AsyncClient::builder(options).build();
         match timeout(DEADLINE, events.poll()).await.expect("an answer in time") {
             Ok(event) => panic!("accepted: {event:?}"),
             Err(error) => error.to_string(),

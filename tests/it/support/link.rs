@@ -2,6 +2,8 @@
 //! itself.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
@@ -35,6 +37,7 @@ struct LinkModes {
 
 pub struct Link {
     modes: LinkModes,
+    n_connections: Arc<AtomicUsize>,
 }
 
 impl Link {
@@ -42,9 +45,10 @@ impl Link {
     pub async fn to_port(port: u16) -> (Self, u16) {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let (link, own) = (Self::new(), listener.local_addr().unwrap().port());
-        let modes = link.modes.clone();
+        let (modes, n_connections) = (link.modes.clone(), link.n_connections.clone());
         tokio::spawn(async move {
             while let Ok((client, _)) = listener.accept().await {
+                n_connections.fetch_add(1, Ordering::Relaxed);
                 let connect = TcpStream::connect(("127.0.0.1", port));
                 tokio::spawn(modes.clone().carry(connect, client));
             }
@@ -70,7 +74,13 @@ impl Link {
 
     fn new() -> Self {
         let mode = || watch::channel(LinkMode::Pass).0;
-        Self { modes: LinkModes { up: mode(), down: mode(), n_lost: watch::channel(0).0 } }
+        let modes = LinkModes { up: mode(), down: mode(), n_lost: watch::channel(0).0 };
+        Self { modes, n_connections: Arc::default() }
+    }
+
+    /// Returns how many connections to a port have been made.
+    pub fn n_connections(&self) -> usize {
+        self.n_connections.load(Ordering::Relaxed)
     }
 
     /// Sets the modes of the directions to the service and from it.
