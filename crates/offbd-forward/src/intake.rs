@@ -64,9 +64,11 @@ async fn take(
     RawQuery(query): RawQuery,
     request: Request,
 ) -> Result<Json<AckView>, Refusal> {
-    // A page of another site may send a body without a type; one with a type only if it is allowed.
-    let header = request.headers().get(CONTENT_TYPE).and_then(|header| header.to_str().ok());
-    let media_type = header.unwrap_or_default().to_owned();
+    // JSON without the header, as for the service. What pages of other sites may send without it
+    // has the header `Origin`.
+    let header = request.headers().get(CONTENT_TYPE);
+    let media_type =
+        header.map_or("application/json", |header| header.to_str().unwrap_or_default()).to_owned();
     let format = TelemetryFormat::of_type(&media_type)?;
     let body = timeout(BODY_TIMEOUT, Bytes::from_request(request, &())).await;
     let body = body.map_err(|_| Refusal::SlowBody)??;
