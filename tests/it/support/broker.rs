@@ -239,7 +239,9 @@ impl Mosquitto {
     pub fn start_with(topics: Option<&str>) -> Self {
         Self::start_of(|directory| {
             let list = directory.join("topics");
-            topics.map(|topics| std::fs::write(&list, topics).unwrap());
+            if let Some(topics) = topics {
+                std::fs::write(&list, topics).unwrap();
+            }
             topics.map(|_| format!("acl_file {}", list.display())).into_iter().collect()
         })
     }
