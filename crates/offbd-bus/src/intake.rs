@@ -4,8 +4,9 @@ use std::future::Future;
 use std::mem::replace;
 use std::sync::Arc;
 
-use futures_util::StreamExt;
+use futures_util::future::BoxFuture;
 use futures_util::stream::FuturesUnordered;
+use futures_util::{FutureExt, StreamExt};
 use hyper::body::Bytes;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 use tokio::time::sleep;
@@ -295,7 +296,8 @@ impl Intake {
                         n_arrived += 1;
                         let asset = delivery.asset.clone();
                         if let Some(delivery) = held.join(&asset, n_arrived, delivery) {
-                            pending.push(self.clone().attempt(n_arrived, delivery));
+                            let attempt = self.attempt(n_arrived, delivery).await;
+                            pending.push(attempt);
                         }
                     }
                     None => open = false,
@@ -312,12 +314,15 @@ impl Intake {
                     } else if open
                         && let Some((number, delivery)) = held.settle(&asset, number)
                     {
-                        pending.push(self.clone().attempt(number, delivery));
+                        let attempt = self.attempt(number, delivery).await;
+                        pending.push(attempt);
                     }
                 }
                 Some(asset) = pauses.next(), if open && !pauses.is_empty() => {
-                    let due = held.due(&asset);
-                    pending.extend(due.map(|(n, delivery)| self.clone().attempt(n, delivery)));
+                    if let Some((number, delivery)) = held.due(&asset) {
+                        let attempt = self.attempt(number, delivery).await;
+                        pending.push(attempt);
+                    }
                 }
             }
         }
@@ -351,24 +356,24 @@ impl Intake {
         is_kept.then_some(delivery)
     }
 
-    /// Tries to have a batch stored.
-    async fn attempt<R>(self, number: u64, mut delivery: Delivery<R>) -> Attempt<R> {
+    /// Tries to have a batch stored: submits it, so that the batches of an asset reach it in order
+    /// of arrival, and returns what becomes of it.
+    async fn attempt<R: Send + 'static>(
+        &self,
+        number: u64,
+        mut delivery: Delivery<R>,
+    ) -> BoxFuture<'static, Attempt<R>> {
         let limit = self.service.limits().requests.batch_samples;
         let batch = delivery.form.batch(&delivery.payload, limit);
-        let reply = if self.service.route(&delivery.asset) == Route::Here {
-            MessageReply::Answer(self.store(&mut delivery, batch).await)
-        } else {
-            self.pass_on(&delivery, batch).await
-        };
-        Attempt { number, delivery, reply }
-    }
-
-    /// Has a batch stored by this node.
-    async fn store<R>(
-        &self,
-        delivery: &mut Delivery<R>,
-        batch: Result<Batch, BatchError>,
-    ) -> BatchAnswer {
+        if self.service.route(&delivery.asset) != Route::Here {
+            let intake = self.clone();
+            return async move {
+                let reply =
+                    intake.pass_on(&delivery.asset, batch.ok().filter(|_| delivery.waits)).await;
+                Attempt { number, delivery, reply }
+            }
+            .boxed();
+        }
         let (id, submitted) = match batch {
             Err(error) => (delivery.form.id(&delivery.payload), Err(error.into())),
             Ok(mut batch) => {
@@ -380,25 +385,23 @@ impl Intake {
         if !delivery.waits {
             delivery.payload = Bytes::new();
         }
-        let ack = match submitted {
-            Ok(pending) => pending.acknowledged().await,
-            Err(error) => Err(error),
-        };
-        BatchAnswer::of(id, ack.map_err(Problem::from))
+        async move {
+            let ack = match submitted {
+                Ok(pending) => pending.acknowledged().await,
+                Err(error) => Err(error),
+            };
+            let reply = MessageReply::Answer(BatchAnswer::of(id, ack.map_err(Problem::from)));
+            Attempt { number, delivery, reply }
+        }
+        .boxed()
     }
 
     /// Handles a batch of an asset that another node owns, which gets and answers it too. If the
     /// bus keeps the batch until it is acknowledged, it is sent to the owner as well, which may
     /// have failed before the batch was stored.
-    async fn pass_on<R>(
-        &self,
-        delivery: &Delivery<R>,
-        batch: Result<Batch, BatchError>,
-    ) -> MessageReply {
-        let Some(batch) = batch.ok().filter(|_| delivery.waits) else {
-            return MessageReply::Nothing;
-        };
-        if self.forwarder.deliver(&self.service, &delivery.asset, &batch).await {
+    async fn pass_on(&self, asset: &str, batch: Option<Batch>) -> MessageReply {
+        let Some(batch) = batch else { return MessageReply::Nothing };
+        if self.forwarder.deliver(&self.service, asset, &batch).await {
             MessageReply::Nothing
         } else {
             MessageReply::Again
