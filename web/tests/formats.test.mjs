@@ -147,7 +147,7 @@ test("of several dropped files one is taken, and the page says which", async () 
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
   await drop("monday.csv");
-  await view.getByRole("dialog").getByText("First values").waitFor();
+  await view.getByRole("dialog").getByText("Columns of the file").waitFor();
   assert.equal(await view.getByText("was taken").count(), 0);
   assert.deepEqual(view.errors, []);
   await view.done();

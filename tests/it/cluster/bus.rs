@@ -154,9 +154,15 @@ async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_
     leave_to_broker(&mut device, &names, &samples[200..]).await;
     cluster.taken_over_from(2).await;
     for name in &names {
+        let client = cluster.client(0);
         let stored = async || {
-            let stored = cluster.client(0).recording(name, "s").await;
-            (stored.len() >= samples.len()).then_some(stored)
+            // Before its first batch, the session is not there.
+            let sessions = client.get(&format!("sessions?asset={name}")).await;
+            let n = sessions.json()["items"][0]["samples"].as_u64()?;
+            if n < samples.len() as u64 {
+                return None;
+            }
+            Some(client.recording(name, "s").await)
         };
         let mut stored = eventually(stored).await;
         stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));

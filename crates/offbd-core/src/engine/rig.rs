@@ -76,8 +76,9 @@ pub struct Rig {
     pub diagnostics: DiagnosticsSpec,
     /// Boxed: it is most of a rig, and many rigs have none.
     pub calibration: Option<Box<Calibration>>,
-    /// Which columns of the rig's files are which quantities, for the readers of files.
-    #[serde(default)]
+    /// Which columns of the rig's files are which quantities, for the readers of files. No part of
+    /// the state of an engine.
+    #[serde(skip)]
     pub columns: Option<Box<str>>,
 }
 
