@@ -9,7 +9,7 @@ use crate::support::bus_device::{BusDevice, MqttDevice, numbered};
 use crate::support::cluster::{Cluster, N_NODES, NodeKind};
 use crate::support::link::Link;
 use crate::support::postgres::Postgres;
-use crate::support::{Client, batch, eventually, rig};
+use crate::support::{Client, batch, eventually, read_csv, rig};
 
 /// Samples of a batch.
 const BATCH: usize = 10;
@@ -162,7 +162,10 @@ async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_
             if n < samples.len() as u64 {
                 return None;
             }
-            Some(client.recording(name, "s").await)
+            let sessions = sessions.json();
+            let id = sessions["items"][0]["id"].as_str()?;
+            let recording = client.get(&format!("sessions/{id}/telemetry")).await;
+            (recording.status == 200).then(|| read_csv(&recording.text))
         };
         let mut stored = eventually(stored).await;
         stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));

@@ -254,14 +254,14 @@ int rename(const char *from, const char *to)
 }
 
 /* A second name, of which the first one is removed next: a renaming. */
-int link(const char *from, const char *to)
+int linkat(int from_folder, const char *from, int to_folder, const char *to, int flags)
 {
-    if (!is_below_folder(from))
-        return REAL(link)(from, to);
+    if (from_folder != AT_FDCWD || to_folder != AT_FDCWD || !is_below_folder(from))
+        return REAL(linkat)(from_folder, from, to_folder, to, flags);
     if (fails(RENAME))
         return -1;
     int result;
-    IN_ORDER(result = REAL(link)(from, to);
+    IN_ORDER(result = REAL(linkat)(from_folder, from, to_folder, to, flags);
              if (result == 0) put('r', from, 0, to, strlen(to)));
     return result;
 }
