@@ -155,24 +155,26 @@ async fn nodes_that_are_paused_and_killed_lose_nothing_that_a_broker_has_at_qos_
     cluster.taken_over_from(2).await;
     for name in &names {
         let client = cluster.client(0);
-        let stored = async || {
-            // Before its first batch, the session is not there.
-            let sessions = client.get(&format!("sessions?asset={name}")).await;
-            let n = sessions.json()["items"][0]["samples"].as_u64()?;
-            if n < samples.len() as u64 {
-                return None;
-            }
-            let sessions = sessions.json();
-            let id = sessions["items"][0]["id"].as_str()?;
-            let recording = client.get(&format!("sessions/{id}/telemetry")).await;
-            (recording.status == 200).then(|| read_csv(&recording.text))
-        };
+        let stored = async || recorded(&client, name, samples.len()).await;
         let mut stored = eventually(stored).await;
         stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         assert_eq!(stored, samples, "{name}");
     }
     cluster.signal(1, "-CONT");
     cluster.settled(2).await;
+}
+
+/// Returns the recording of the only session of an asset once it has `n` samples. Before its first
+/// batch, the session is not there, and while the asset moves nothing is answered.
+async fn recorded(client: &Client, asset: &str, n: usize) -> Option<Vec<Sample>> {
+    let sessions = client.get(&format!("sessions?asset={asset}")).await.json();
+    let session = &sessions["items"][0];
+    if session["samples"].as_u64()? < n as u64 {
+        return None;
+    }
+    let id = session["id"].as_str()?;
+    let recording = client.get(&format!("sessions/{id}/telemetry")).await;
+    (recording.status == 200).then(|| read_csv(&recording.text))
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -188,10 +190,8 @@ async fn batches_of_a_killed_owner_disconnect_no_node_from_the_broker() {
     leave_to_broker(&mut device, &owned, &samples[100..]).await;
     cluster.taken_over_from(1).await;
     for name in &owned {
-        let stored = async || {
-            let stored = cluster.client(0).recording(name, "s").await;
-            (stored.len() >= samples.len()).then_some(stored)
-        };
+        let client = cluster.client(0);
+        let stored = async || recorded(&client, name, samples.len()).await;
         let mut stored = eventually(stored).await;
         stored.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         assert_eq!(stored, samples, "{name}");
