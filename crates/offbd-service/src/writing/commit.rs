@@ -28,6 +28,10 @@ const RETRY_LONGEST: Duration = Duration::from_secs(2);
 /// than the idle time after which PostgreSQL ends the connection of a node.
 const ROOM_RETRY_LONGEST: Duration = Duration::from_millis(500);
 
+/// How often a group of write sets may find no room before each set is tried alone, and a set
+/// alone before it is refused: its change may be what never fits. Chosen: some ten seconds.
+const MAX_FULL: u32 = 20;
+
 /// How often a group of write sets may fail while the database accepts other changes.
 /// After that each set is tried alone, and a set that fails alone as often is refused. Two
 /// losses of the connection in a row may be a coincidence, three with the same changes
@@ -350,12 +354,13 @@ impl Committer {
                 n_full += 1;
                 match self.await_room(&error, n_full).await {
                     Recovery::Committed => break,
-                    Recovery::NotCommitted => continue,
+                    Recovery::NotCommitted if n_full < MAX_FULL => continue,
+                    Recovery::NotCommitted => {}
                     Recovery::Closing => return Err(CommitFailure::Closing),
                 }
             }
             n_failed += 1;
-            if error.is_outage() {
+            if error.is_outage() && !error.is_full() {
                 match self.recover(&error).await {
                     Recovery::Committed => break,
                     Recovery::Closing => return Err(CommitFailure::Closing),
@@ -365,7 +370,10 @@ impl Committer {
             }
             tracing::error!(%error, sets = sets.len(), n_failed, "commit failed");
             if !error.is_damage() {
-                self.note_room(n_full);
+                // Without room the store stays unavailable until something is committed.
+                if !error.is_full() {
+                    self.note_room(n_full);
+                }
                 return Err(CommitFailure::Rejected);
             }
             if !self.is_committed_after_damage().await? {
