@@ -15,7 +15,7 @@ mod traces;
 
 use std::fmt;
 use std::fs::{File, TryLockError};
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::pin::pin;
@@ -165,16 +165,21 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
     Ok(server)
 }
 
+/// The address at which this machine reaches a service that listens on `address`: one cannot
+/// connect to "all addresses".
+pub(crate) fn own_address(mut address: SocketAddr) -> SocketAddr {
+    match address.ip() {
+        IpAddr::V4(ip) if ip.is_unspecified() => address.set_ip(Ipv4Addr::LOCALHOST.into()),
+        IpAddr::V6(ip) if ip.is_unspecified() => address.set_ip(Ipv6Addr::LOCALHOST.into()),
+        _ => {}
+    }
+    address
+}
+
 /// Returns the address of the page as a browser on this machine opens it.
 fn page_url(address: SocketAddr, is_encrypted: bool) -> String {
     let scheme = if is_encrypted { "https" } else { "http" };
-    // One cannot connect to "all addresses".
-    let host = match address.ip() {
-        ip if ip.is_unspecified() => "localhost".to_owned(),
-        IpAddr::V6(ip) => format!("[{ip}]"),
-        ip => ip.to_string(),
-    };
-    format!("{scheme}://{host}:{}/", address.port())
+    format!("{scheme}://{}/", own_address(address))
 }
 
 /// The interface of the service, with the additional routes of the demo.
@@ -519,9 +524,9 @@ mod tests {
     fn the_page_has_an_address_that_a_browser_opens() {
         for (address, is_encrypted, page) in [
             ("127.0.0.1:8087", false, "http://127.0.0.1:8087/"),
-            ("0.0.0.0:80", false, "http://localhost:80/"),
+            ("0.0.0.0:80", false, "http://127.0.0.1:80/"),
             ("[::1]:8443", true, "https://[::1]:8443/"),
-            ("[::]:8087", false, "http://localhost:8087/"),
+            ("[::]:8087", false, "http://[::1]:8087/"),
         ] {
             assert_eq!(page_url(address.parse().unwrap(), is_encrypted), page);
         }

@@ -1,6 +1,6 @@
 //! `offbd check --health`: asks the running service whether it is ready.
 
-use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -16,6 +16,7 @@ use tokio_rustls::rustls::pki_types::{CertificateDer, ServerName, UnixTime};
 use tokio_rustls::rustls::{ClientConfig, DigitallySignedStruct, Error, SignatureScheme};
 
 use crate::config::Config;
+use crate::server::own_address;
 
 /// Longest time until the answer. Chosen: longer than the service waits for its store.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(4);
@@ -30,7 +31,7 @@ const REQUEST: &[u8] = b"GET /readyz HTTP/1.0\r\nhost: localhost\r\n\r\n";
 /// # Errors
 /// If it does not answer in time, or is not ready.
 pub(super) async fn ask(config: &Config) -> anyhow::Result<()> {
-    let address = SocketAddr::new(own_address(config.listen.ip()), config.listen.port());
+    let address = own_address(config.listen);
     let answer = tokio::time::timeout(ANSWER_TIMEOUT, answer(address, config.tls.is_some())).await;
     let late = || format!("no answer within {} s at {address}", ANSWER_TIMEOUT.as_secs());
     let answer = answer.with_context(late)?;
@@ -40,15 +41,6 @@ pub(super) async fn ask(config: &Config) -> anyhow::Result<()> {
         return Ok(());
     }
     bail!("the service is not ready: {}", if body.is_empty() { head } else { body })
-}
-
-/// The address of this machine at which a service that listens on `ip` answers.
-fn own_address(ip: IpAddr) -> IpAddr {
-    match ip {
-        IpAddr::V4(v4) if v4.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
-        IpAddr::V6(v6) if v6.is_unspecified() => Ipv6Addr::LOCALHOST.into(),
-        ip => ip,
-    }
 }
 
 async fn answer(address: SocketAddr, is_encrypted: bool) -> anyhow::Result<String> {

@@ -21,7 +21,7 @@ use offbd_wire::bus::{BatchAckView, BatchRefusalView, DeviceTopic};
 use offbd_wire::mapping::MappedTopic;
 use offbd_wire::telemetry::{self, AckView, Batch, BatchError};
 
-/// Why a batch is refused if there is no room for it.
+/// The error of a batch that finds the queue or its bytes full.
 const BUSY: ServiceError = ServiceError::Busy { what: "too many messages wait to be parsed" };
 
 /// A batch of a device that waits to be parsed, or is tried again.
@@ -357,7 +357,7 @@ impl Intake {
     }
 
     /// Tries to have a batch stored: submits it, so that the batches of an asset reach it in order
-    /// of arrival, and returns what becomes of it.
+    /// of arrival, and returns the future of its reply.
     async fn attempt<R: Send + 'static>(
         &self,
         number: u64,

@@ -35,8 +35,8 @@ impl LineFormat {
 }
 
 /// Spools `lines` for `asset` to their end; returns the number of those that it could not keep.
-/// While the spool is full or fails the source is not read, so that its writer waits; when the
-/// agent is told to stop, what was read is kept beyond the limit.
+/// While the spool is full or fails the source is not read, so that its writer waits; after a
+/// stop signal, what was read is kept beyond the limit.
 pub async fn spool_lines(
     spool: &Spool,
     mut lines: Lines,
@@ -89,8 +89,8 @@ fn log_invalid(batch: &NewBatch, logged: &Reasons) {
     }
 }
 
-/// Adds a batch, once there is room for it and the spool does not fail, or at once when the agent
-/// is told to stop.
+/// Adds a batch, once there is room for it and the spool does not fail, or at once after a stop
+/// signal.
 async fn put(spool: &Spool, batch: &NewBatch, mut stop: Stop) -> Result<(), SpoolError> {
     let logged = Reasons::default();
     while let Err(error) = spool.put(batch).await {

@@ -1,4 +1,4 @@
-//! Accepts connections and serves HTTP over them, until the agent is told to stop.
+//! Accepts connections and serves HTTP over them, until a stop signal.
 
 use std::pin::pin;
 use std::time::Duration;
@@ -19,12 +19,12 @@ const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most connections at a time; further ones wait. Chosen: some for each rig of a site, and less
 /// than the descriptors that a process may have.
 const MAX_CONNECTIONS: usize = 256;
-/// Longest time for the requests in progress when the agent is told to stop.
+/// Longest time for the requests in progress after a stop signal.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pause after the operating system could not accept a connection.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves until the agent is told to stop, and then until the requests in progress are answered.
+/// Serves until a stop signal, and then until the requests in progress are answered.
 pub(super) async fn serve(listener: TcpListener, router: Router, mut stop: Stop) {
     let mut connections = JoinSet::new();
     loop {

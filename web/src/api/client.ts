@@ -16,6 +16,7 @@ import type {
   FaultLine,
   FaultRecording,
   FileInspection,
+  FileReading,
   FleetEntry,
   HistoryEntry,
   ImportResult,
@@ -110,9 +111,9 @@ export const api = {
   removeRemark: (session: string, id: string) =>
     send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
   /** Reads a file without importing it. */
-  inspectRecording: (asset: string, file: File, reading: { columns?: string; rate?: number }) =>
+  inspectRecording: (asset: string, file: File, reading: FileReading) =>
     sendFile<FileInspection>(asset, file, { ...reading, dry_run: true }),
-  importRecording: (asset: string, name: string, file: File, reading: { columns?: string; rate?: number }) =>
+  importRecording: (asset: string, name: string, file: File, reading: FileReading) =>
     sendFile<ImportResult>(asset, file, { ...reading, name }),
   replay: (session: string, settings: ReplaySettings) =>
     send<Replay>("POST", `/sessions/${segment(session)}/replays`, settings),

@@ -27,13 +27,13 @@ export const FORMATS: Record<FormatName, Format> = {
 /** The formats in which the service sends a recording. */
 export const WRITTEN: FormatName[] = ["csv", "json", "parquet", "arrow", "mcap"];
 
-/** The status codes of a format that the service does not have: not acceptable, unsupported media type. */
-const REFUSED = [406, 415];
+/** The status code of a format that the service does not have. */
+const NOT_ACCEPTABLE = 406;
 
 /** Returns `error` in words if it says that the service is built without the format, otherwise as it is. */
 export function formatError(error: unknown, name: FormatName): unknown {
   const { word, feature } = FORMATS[name];
-  const isRefused = error instanceof ProblemError && REFUSED.includes(error.status);
+  const isRefused = error instanceof ProblemError && error.status === NOT_ACCEPTABLE;
   if (!isRefused || !feature) return error;
   return new Error(
     `This service is built without ${word} files. Use CSV, or ask for a build with the feature “${feature}”.`,

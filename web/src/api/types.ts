@@ -55,6 +55,12 @@ export type HistoryEntry = Schemas["History"];
 export type FileColumn = Schemas["InspectedColumn"];
 export type FileInspection = Schemas["Inspection"];
 export type FileMotion = Schemas["InspectedMotion"];
+/** How a file is to be read: the mapping of its columns, and the rows a second of one without a time. */
+export interface FileReading {
+  columns?: string;
+  rate?: number;
+}
+
 export type FileQuantity = Schemas["InspectedQuantity"];
 export type ImportResult = Schemas["Import"];
 export type Learning = Schemas["Learning"];

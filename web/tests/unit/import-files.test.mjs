@@ -33,11 +33,11 @@ test("the mapping that was found is what an import is given", () => {
 
 test("a build without a format is told in words, other errors as they are", () => {
   const refused = (status) => new ProblemError(status, { detail: "as the service says" });
-  assert.match(formatError(refused(415), "xlsx").message, /built without Excel files.*feature “xlsx”/);
+  assert.match(formatError(refused(406), "mcap").message, /built without MCAP files.*feature “mcap”/);
   assert.match(formatError(refused(406), "arrow").message, /built without Arrow files.*feature “parquet”/);
   for (const [error, name] of [
     [refused(400), "xlsx"],
-    [refused(415), "csv"],
+    [refused(406), "csv"],
     [new TypeError("offline"), "mcap"],
   ])
     assert.equal(formatError(error, name), error);

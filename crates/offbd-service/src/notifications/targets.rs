@@ -209,6 +209,7 @@ mod tests {
             assert!(policy(&[], true).check_host(address).is_err(), "{address}");
         }
     }
+
     #[test]
     fn metadata_of_clouds_are_refused_in_every_form() {
         let policy = policy(&[], true);

@@ -2,7 +2,7 @@ import type { FileInspection } from "../../api/types";
 import { count, number, plural } from "../../words/numbers";
 import { plainText, type Mapping } from "./mapping";
 
-/** A rate and another one differ if one is more than this factor of the other. */
+/** Two rates differ from this factor on. Chosen: no rig varies so much, and each unit of time does. */
 const SAME_RATE = 1.5;
 
 interface Props {

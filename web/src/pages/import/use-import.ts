@@ -1,9 +1,8 @@
 import { useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
-import type { ImportResult } from "../../api/types";
+import type { FileReading, ImportResult } from "../../api/types";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
-import type { Reading } from "./use-inspection";
 
 export interface ImportProps {
   fileName: string;
@@ -24,7 +23,7 @@ export function useImport({ fileName, assets, asset, setAsset, imported }: Impor
   /** Rigs that were registered for an import that has failed. */
   const registered = useRef<string[]>([]);
   /** Imports the file; `isKept` tells whether further files of the rig are read in the same way. */
-  const send = async (file: File, reading: Reading, isKept: boolean) => {
+  const send = async (file: File, reading: FileReading, isKept: boolean) => {
     const columns = isKept ? reading.columns : undefined;
     if (![...assets, ...registered.current].includes(asset)) {
       await api.createAsset({ name: asset, columns });

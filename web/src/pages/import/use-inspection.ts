@@ -1,7 +1,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { api } from "../../api/client";
 import { errorText } from "../../api/request";
-import type { FileInspection } from "../../api/types";
+import type { FileInspection, FileReading } from "../../api/types";
 import { columnsParameter, mappingOf, type Mapping } from "./mapping";
 
 /** Largest file, bytes; also the default limit of the service. */
@@ -10,19 +10,12 @@ const MAX_BYTES = 64 << 20;
 /** A name for the rig of a file before one is chosen; it need not exist. */
 const ANY_RIG = "any";
 
-/** How a file is to be read. */
-export interface Reading {
-  columns?: string;
-  /** Rows a second of a file without a time. */
-  rate?: number;
-}
-
 /**
  * Lets the service read a file without importing it, as the files of a rig if one is chosen; again after each
  * change of the mapping. What was found last stays while the file is read again.
  */
 export function useInspection(file: File, rig: string | undefined) {
-  const [reading, setReading] = useState<Reading>({});
+  const [reading, setReading] = useState<FileReading>({});
   const [inspection, setInspection] = useState<FileInspection>();
   const [problem, setProblem] = useState<string>();
   const [isBusy, setBusy] = useState(true);
