@@ -78,14 +78,26 @@ impl GatedCluster {
         assert_eq!(status, 201, "{made}");
     }
 
-    /// The node that owns an asset.
+    /// The node that owns an asset, as all nodes say.
     async fn owner(&self, asset: &str) -> usize {
         let path = format!("cluster?asset={asset}");
         eventually(|| async {
-            let (_, place) = call(&self.cluster.client(0), Method::GET, &path, &Value::Null).await;
-            (0..NODES).find(|i| place["asset"]["owner"] == format!("node-{i}").as_str())
+            let mut names = BTreeSet::new();
+            for client in self.cluster.clients() {
+                let (_, place) = call(&client, Method::GET, &path, &Value::Null).await;
+                names.insert(place["asset"]["owner"].as_str()?.to_owned());
+            }
+            (0..NODES).find(|i| names == BTreeSet::from([format!("node-{i}")]))
         })
         .await
+    }
+
+    /// Waits until a node has lost more than `lost` partitions since its start.
+    async fn has_lost(&self, client: &Client, lost: f64) {
+        eventually(|| async {
+            (count(client, "offbd_partitions_lost_total").await > lost).then_some(())
+        })
+        .await;
     }
 
     /// Ends the connection with which a node writes.
@@ -159,10 +171,7 @@ async fn hold_in_commit(it: &mut GatedCluster, asset: &str, point: HoldPoint) ->
     let second = it.send(woken.clone(), asset, &samples[1000..1200]);
     it.gates[held].release();
     second.await.unwrap();
-    eventually(|| async {
-        (count(&woken, "offbd_partitions_lost_total").await > lost).then_some(())
-    })
-    .await;
+    it.has_lost(&woken, lost).await;
     it.send(woken.clone(), asset, &samples[1200..]).await.unwrap();
     it.recorder.look(&woken, asset).await;
     true
@@ -191,12 +200,14 @@ async fn hold_in_take_over(
     let (woken, other) = (it.cluster.client(held), it.cluster.client(1 - held));
     it.subscriber.link.set_service(&other);
     it.send(other.clone(), "rig", parts.next().unwrap()).await.unwrap();
+    let lost = count(&other, "offbd_partitions_lost_total").await;
     it.gates[held].hold_at(TAKE_OVER, point);
     it.cluster.signal(1 - held, "-STOP");
     it.end_writer(1 - held).await;
     let is_met = it.gates[held].held().await.is_some();
     it.cluster.signal(1 - held, "-CONT");
     if !is_met {
+        it.has_lost(&other, lost).await;
         return false;
     }
     assert!(it.replaced(held).await);
