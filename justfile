@@ -41,7 +41,7 @@ browser:
     cargo build --bin offbd
     npm --prefix web test
 
-# Update the dashboard's pictures in README.md
+# Update the dashboard's pictures in the documents
 screenshots:
     scripts/screenshots --docs
 
