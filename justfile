@@ -27,7 +27,7 @@ serve *ARGS:
 openapi:
     UPDATE_OPENAPI=1 cargo test --package offbd-http --test description
 
-# Update the command output in README.md
+# Update the command output in the pages of the tour
 tour:
     cargo build --release
     scripts/tour --update
@@ -41,7 +41,7 @@ browser:
     cargo build --bin offbd
     npm --prefix web test
 
-# Update the dashboard's pictures in README.md
+# Update the dashboard's pictures in the documents
 screenshots:
     scripts/screenshots --docs
 

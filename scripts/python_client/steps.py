@@ -1,4 +1,4 @@
-"""Takes the steps of the tour of README.md with the generated client, and checks what comes back.
+"""Takes the steps of docs/tour.md with the generated client, and checks what comes back.
 
     steps.py ADDRESS LEARNT.json SICK.csv
 

@@ -1,16 +1,25 @@
 //! Rules of `ARCHITECTURE.md` that the compiler does not check: names that some folders must not
-//! use, and that documents name only existing paths.
+//! use, and that documents name only existing paths and headings.
 
 mod bounds;
 mod documents;
+mod links;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// Documents whose paths must exist.
+/// Documents outside `docs/` whose paths must exist.
 const DOCUMENTS: [&str; 3] = ["ARCHITECTURE.md", "README.md", "CONTRIBUTING.md"];
+
+/// Returns the documents whose paths must exist: `DOCUMENTS` and those in `docs/`.
+fn pages() -> Vec<String> {
+    let entries = std::fs::read_dir(Path::new(ROOT).join("docs")).unwrap();
+    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let in_docs = names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
+    DOCUMENTS.map(str::to_owned).into_iter().chain(in_docs).collect()
+}
 
 /// Names that must not occur in a folder, beyond what the dependencies of its crate forbid: what
 /// makes the same input give another result.
@@ -120,7 +129,7 @@ fn every_path_named_in_a_document_exists() {
         let root = Path::new(ROOT);
         root.join(path).exists() || root.join("src").join(path).exists()
     };
-    let missing: Vec<String> = DOCUMENTS
+    let missing: Vec<String> = pages()
         .iter()
         .flat_map(|name| {
             let text = std::fs::read_to_string(Path::new(ROOT).join(name))

@@ -1,15 +1,11 @@
-// The walkthrough of README.md, from the demo to the explanation of a fault. The words that it
+// The walkthrough of docs/walk.md, from the demo to the explanation of a fault. The words that it
 // has in italics or bold must be on the page.
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
 import { ask, browser, demo, offbd, page, until } from "./support.mjs";
 
-const README = readFileSync(new URL("../../README.md", import.meta.url), "utf8");
-const WALK = README.slice(
-  README.indexOf("## A walk through the dashboard"),
-  README.indexOf("## A tour in five minutes"),
-);
+const WALK = readFileSync(new URL("../../docs/walk.md", import.meta.url), "utf8");
 
 let show, chromium, view;
 

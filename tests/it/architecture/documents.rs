@@ -9,8 +9,8 @@ const PATH_ENDINGS: [&str; 11] =
     [".rs", ".md", ".yaml", ".sql", ".lock", ".toml", ".py", ".svg", ".sh", ".html", "/"];
 
 /// Returns a message with line and path for every path in `text` for which `exists` is
-/// false. Paths are searched in code spans and link targets, not in fenced blocks, which show
-/// the reader's own directory.
+/// false. Paths are searched in code spans, not in fenced blocks, which show the reader's own
+/// directory.
 pub fn missing_paths(document: &str, text: &str, exists: impl Fn(&str) -> bool) -> Vec<String> {
     let mut missing = Vec::new();
     let mut fenced = false;
@@ -23,10 +23,7 @@ pub fn missing_paths(document: &str, text: &str, exists: impl Fn(&str) -> bool) 
             continue;
         }
         let spans = line.split('`').skip(1).step_by(2).filter(|span| is_path(span));
-        let links = line.split("](").skip(1).filter_map(|rest| rest.split(')').next());
-        let links = links.filter(|link| !link.contains("://") && !link.starts_with('#'));
-        let links = links.map(|link| link.split('#').next().unwrap_or(link));
-        for path in spans.chain(links).filter(|path| !exists(path)) {
+        for path in spans.filter(|path| !exists(path)) {
             missing.push(format!("{document}:{}: `{path}` does not exist", number + 1));
         }
     }
@@ -60,8 +57,7 @@ mod tests {
 
     #[test]
     fn a_missing_path_is_reported_with_its_line() {
-        let text =
-            "See `src/engine/admit.rs`.\n\nAnd `src/utils/misc.rs`, [here](docs/gone.svg).\n";
+        let text = "See `src/engine/admit.rs`.\n\nAnd `src/utils/misc.rs`, `docs/gone.svg`.\n";
         let exists = |path: &str| path == "src/engine/admit.rs";
         assert_eq!(
             missing_paths("A.md", text, exists),

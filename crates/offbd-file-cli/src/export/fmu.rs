@@ -13,8 +13,8 @@ use offbd_wire::fmu::{FmuPlatform, archive};
 
 /// Writes the digital twin of a rig as an FMU, for other simulators.
 ///
-/// An FMU (FMI 3.0, co-simulation) can be imported by Simulink, OpenModelica, FMPy and
-/// others. Its inputs are the commands of both servos in rad; its outputs are the
+/// An FMU (FMI 3.0, co-simulation) runs in other simulators; it is tested with FMPy and
+/// ecos. Its inputs are the commands of both servos in rad; its outputs are the
 /// position and velocity of the ball and the angles of the plate. The parameters start
 /// with the values of the asset file, calibrated if it is.
 #[derive(Clone, Debug, Args)]
