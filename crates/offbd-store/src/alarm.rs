@@ -202,6 +202,10 @@ async fn regain(db: &mut AnyConnection, row: &CommunicationChange) -> Result<(),
     Ok(())
 }
 
+/// The assets of which no data arrive, or whose data have stayed away at some time.
+const COMMUNICATION: &str = "SELECT * FROM communication
+    WHERE asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL)";
+
 impl Store {
     /// All mutes that end after `now`.
     ///
@@ -219,25 +223,38 @@ impl Store {
         Ok(sqlx::query_as("SELECT * FROM note ORDER BY code").fetch_all(&self.pool).await?)
     }
 
-    /// The assets of which no data arrive, or whose data have stayed away at some time.
+    /// The assets of which no data arrive.
+    pub async fn lost_communications(
+        &self,
+        asset: Option<&str>,
+    ) -> Result<Vec<CommunicationRow>, StoreError> {
+        let mut query = QueryBuilder::new(COMMUNICATION);
+        query.push(" AND lost = 1");
+        if let Some(asset) = asset {
+            query.push(" AND asset = ").bind(asset)?;
+        }
+        Ok(query.rows().fetch_all(&self.pool).await?)
+    }
+
+    /// The assets of which no data arrive, or whose data have stayed away at some time, the latest
+    /// change first, from the change and the asset `from` on.
     pub async fn communications(
         &self,
         asset: Option<&str>,
         tag: Option<&str>,
-        lost_only: bool,
+        from: Option<(Micros, String)>,
+        limit: u32,
     ) -> Result<Vec<CommunicationRow>, StoreError> {
-        let mut query = QueryBuilder::new(
-            "SELECT * FROM communication
-             WHERE asset NOT IN (SELECT name FROM asset WHERE deleted_at IS NOT NULL)",
-        );
+        let mut query = QueryBuilder::new(COMMUNICATION);
         if let Some(asset) = asset {
             query.push(" AND asset = ").bind(asset)?;
         }
         query.push_tagged("asset", tag)?;
-        if lost_only {
-            query.push(" AND lost = 1");
+        if let Some((changed_at, asset)) = from {
+            query.push(" AND (changed_at, asset) <= (").bind(changed_at)?;
+            query.push(", ").bind(asset)?.push(")");
         }
-        query.push(" ORDER BY changed_at DESC, asset DESC");
+        query.push(" ORDER BY changed_at DESC, asset DESC LIMIT ").bind(i64::from(limit))?;
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 

@@ -79,7 +79,7 @@ impl CommunicationWatch {
     async fn look(&mut self, now: Micros) -> Result<(), ServiceError> {
         let store = &self.handles.store;
         let open = store.open_links(self.handles.ownership.filter().as_deref()).await?;
-        let lost = store.communications(None, None, true).await?;
+        let lost = store.lost_communications(None).await?;
         let was_lost: BTreeMap<_, _> = lost.into_iter().map(|row| (row.asset, row.since)).collect();
         self.wait_anew_after_jump(now);
         let mut changes = Vec::new();

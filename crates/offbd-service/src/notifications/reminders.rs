@@ -66,7 +66,7 @@ impl<T: NotificationTransport> Context<T> {
     async fn is_open(&self, asset: &str, code: AlarmCodeWord) -> Result<bool, ServiceError> {
         let store = &self.handles.store;
         let Some(fault) = code.fault_code() else {
-            let lost = store.communications(Some(asset), None, true).await?;
+            let lost = store.lost_communications(Some(asset)).await?;
             return Ok(lost.first().is_some_and(|row| row.acknowledged_at.is_none()));
         };
         let Some(row) = store.fault(asset, fault.as_str()).await? else { return Ok(false) };

@@ -77,7 +77,7 @@ impl Service {
         limit: u32,
     ) -> Result<Page<AlarmView>, ServiceError> {
         let after: Option<AlarmKey> = query.cursor.as_deref().map(views::cursor).transpose()?;
-        let lost = self.lost(&query, after.as_ref()).await?;
+        let lost = self.lost(&query, after.clone(), limit).await?;
         let (mut found, rest) = self.failures(&query, after, limit).await?;
         // Of lost communication what belongs to the same stretch of time as the faults.
         found.extend(lost.into_iter().filter(|(key, _)| rest.as_ref().is_none_or(|r| key > r)));
@@ -141,23 +141,43 @@ impl Service {
         }
     }
 
-    /// Returns the lost communications after the key `after` that `query` selects.
+    /// Returns the lost communications after the key `after` that `query` selects, `limit + 1` if
+    /// there are as many.
     async fn lost(
         &self,
         query: &AlarmQuery,
-        after: Option<&AlarmKey>,
+        mut after: Option<AlarmKey>,
+        limit: u32,
     ) -> Result<Vec<(AlarmKey, AlarmView)>, ServiceError> {
         let (asset, tag) = (query.asset.as_deref(), query.tag.as_deref());
-        let rows = self.inner.handles.store.communications(asset, tag, false).await?;
         let code = AlarmCodeWord::CommunicationLost;
-        let alarms = rows.into_iter().map(|row| {
-            let key = (row.changed_at, row.asset.clone(), code.to_string());
-            (key, self.communication_alarm(row))
-        });
-        let taken = |(key, alarm): &(AlarmKey, AlarmView)| {
-            after.is_none_or(|after| key < after) && query.takes(alarm, key.0)
-        };
-        Ok(alarms.filter(taken).collect())
+        if query.code.is_some_and(|wanted| wanted != code) {
+            return Ok(Vec::new());
+        }
+        let mut found = Vec::new();
+        loop {
+            let from = after.clone().map(|(changed_at, asset, _)| (changed_at, asset));
+            let rows = self.inner.handles.store.communications(asset, tag, from, ROWS).await?;
+            let is_last = rows.len() < ROWS as usize;
+            for row in rows {
+                let key = (row.changed_at, row.asset.clone(), code.to_string());
+                if after.as_ref().is_some_and(|after| key >= *after) {
+                    continue;
+                }
+                after = Some(key.clone());
+                let alarm = self.communication_alarm(row);
+                if query.takes(&alarm, key.0) {
+                    found.push((key, alarm));
+                }
+                if found.len() > limit as usize {
+                    return Ok(found);
+                }
+            }
+            let passed = after.as_ref().is_some_and(|(at, ..)| query.from > Some(*at));
+            if is_last || passed {
+                return Ok(found);
+            }
+        }
     }
 
     fn muted(&self, asset: &str, code: AlarmCodeWord) -> Option<offbd_wire::alarm::MuteView> {
@@ -272,7 +292,7 @@ impl Service {
             return self.acknowledge(asset, fault.as_str(), actor).await.map(drop);
         }
         self.check_known(asset).await?;
-        let lost = self.inner.handles.store.communications(Some(asset), None, true).await?;
+        let lost = self.inner.handles.store.lost_communications(Some(asset)).await?;
         if lost.is_empty() {
             let (asset, code) = (asset.to_owned(), code.to_string());
             return Err(ServiceError::NothingToAcknowledge { asset, code });
