@@ -66,8 +66,8 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
     let utf16 = table(&HEADER.replace(',', "\t"), rows, "\t", plain);
     let utf16 =
         [0xfeff].into_iter().chain(utf16.encode_utf16()).flat_map(u16::to_le_bytes).collect();
-    #[cfg_attr(not(feature = "xlsx"), expect(unused_mut))]
-    let mut files = vec![
+    let mut files = json_files(rows);
+    files.extend([
         file("plain", table(HEADER, rows, ",", plain), ""),
         file("spreadsheet", table(&semicolons, rows, ";", commas), ""),
         file(
@@ -105,13 +105,53 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             table("", rows, ",", plain),
             "t_s=#1, cmd_qx_rad=#2, cmd_qy_rad=#3, x_m=#4, y_m=#5",
         ),
-    ];
+    ]);
     #[cfg(feature = "xlsx")]
     {
         let columns = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y";
         files.push(OddFile { name: "workbook", bytes: spreadsheet(rows), columns, rate: None });
     }
     files
+}
+
+/// JSON documents, as programs write them.
+fn json_files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
+    let names = || HEADER.split(',');
+    // A missing value is null, or its key is absent.
+    let object = |row: &[Option<f64>; 5], has_nulls: bool| -> Value {
+        let members = names().zip(row).filter(|(_, value)| has_nulls || value.is_some());
+        members.map(|(name, value)| (name.to_owned(), json!(value))).collect()
+    };
+    let lines: Vec<String> = rows.iter().map(|row| object(row, false).to_string()).collect();
+    let columns: Value = names()
+        .enumerate()
+        .map(|(i, name)| (name.to_owned(), rows.iter().map(|row| json!(row[i])).collect::<Value>()))
+        .collect();
+    let nested = |[t, qx, qy, x, y]: &[Option<f64>; 5]| json!({ "stamp": { "s": t }, "q": [qx, qy], "ball": { "x": x, "y": y } });
+    let file = |name, document: Value, columns| OddFile {
+        name,
+        bytes: document.to_string().into_bytes(),
+        columns,
+        rate: None,
+    };
+    let rows_of = |has_nulls| rows.iter().map(|row| object(row, has_nulls)).collect::<Value>();
+    vec![
+        file("json rows", rows_of(false), ""),
+        file("json batch", json!({ "session": "s", "samples": rows_of(true) }), ""),
+        file("json columns", columns, ""),
+        file("json split", json!({ "columns": names().collect::<Vec<_>>(), "data": rows }), ""),
+        OddFile {
+            name: "json lines",
+            bytes: lines.join("\n").into_bytes(),
+            columns: "",
+            rate: None,
+        },
+        file(
+            "json nested",
+            rows.iter().map(nested).collect(),
+            "t_s=stamp.s, cmd_qx_rad='q[0]', cmd_qy_rad='q[1]', x_m=ball.x, y_m=ball.y",
+        ),
+    ]
 }
 
 /// A workbook with a title, other names and a line of units; a cell without a value is absent.

@@ -119,7 +119,7 @@ test("a build offers only what it has", async () => {
   );
   assert.deepEqual(await formats.allTextContents(), ["CSV", "JSON", "MCAP"]);
   await view.goto(`${service.url}/sessions`);
-  await view.getByText("Drop a recording here (CSV or MCAP), or").waitFor();
+  await view.getByText("Drop a recording here (CSV, JSON or MCAP), or").waitFor();
   await view.goto(`${service.url}/notifications`);
   await view.getByRole("button", { name: "Add a channel" }).click();
   await view.getByLabel("Kind").selectOption({ label: "E-mail (not in this build)" });

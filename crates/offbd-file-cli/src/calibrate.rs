@@ -9,6 +9,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::judge::{TableArgs, load_rig, read_samples};
+use crate::recordings::{JoinArgs, Recording};
 use offbd_core::diagnosis::{
     AxisCalibration, Calibration, CalibrationOrigin, LeftOut, MonitorCertificate, Prospects,
     ServoProspects, SessionEstimate,
@@ -42,9 +43,11 @@ pub struct CalibrateArgs {
     /// The rig's asset file
     #[arg(long, value_name = "ASSET.json")]
     asset: PathBuf,
-    /// Healthy sessions
+    /// Healthy sessions; of a folder all files
     #[arg(required = true, value_name = "HEALTHY.csv")]
     sessions: Vec<PathBuf>,
+    #[command(flatten)]
+    join: JoinArgs,
     /// The calibrated asset file to write; - is stdout
     #[arg(short, long, value_name = "OUT.json")]
     output: PathBuf,
@@ -63,8 +66,10 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<()> {
     }
     let mut rig = load_rig(Some(&args.asset))?;
     let options = args.table.options().of_rig(rig.columns.as_deref());
-    let sessions = load(&args.sessions, &options)?;
-    let calibration = learn(&rig, &sessions, &data_hash(&args.sessions)?)
+    let recordings = args.join.recordings(&args.sessions)?;
+    let sessions = load(&recordings, &options)?;
+    let files: Vec<_> = recordings.into_iter().flat_map(|recording| recording.files).collect();
+    let calibration = learn(&rig, &sessions, &data_hash(&files)?)
         .map_err(|e| InputError::new("cannot calibrate", e))?;
     if args.format == OutputFormat::Table {
         report(&rig, &calibration);
@@ -90,16 +95,16 @@ fn learnt(rig: &Rig) -> LearntRig {
 
 /// Loads the samples of healthy sessions, each run as one. Invalid rows are left out and reported
 /// on stderr.
-pub fn load(paths: &[PathBuf], options: &TableOptions) -> Result<Vec<Vec<Sample>>, InputError> {
-    let mut sessions = Vec::with_capacity(paths.len());
-    for path in paths {
-        let (runs, bad_rows) = read_samples(path, options)?;
+pub fn load(
+    recordings: &[Recording],
+    options: &TableOptions,
+) -> Result<Vec<Vec<Sample>>, InputError> {
+    let mut sessions = Vec::with_capacity(recordings.len());
+    for recording in recordings {
+        let (runs, bad_rows) = read_samples(recording, options)?;
         if let Some(first) = bad_rows.first() {
-            let n = bad_rows.len();
-            output::remark(format_args!(
-                "{}: {n} rows rejected, the first: {first}",
-                path.display()
-            ));
+            let (n, name) = (bad_rows.len(), recording.words());
+            output::remark(format_args!("{name}: {n} rows rejected, the first: {first}"));
         }
         sessions.extend(runs);
     }

@@ -4,6 +4,7 @@
 use std::fs::File;
 use std::path::Path;
 
+use crate::recordings::Recording;
 use clap::Args;
 use offbd_terminal::errors::{InputError, read};
 pub use offbd_wire::judging::JudgedSession;
@@ -66,11 +67,20 @@ pub fn judge_file(
     path: &Path,
     options: &TableOptions,
 ) -> Result<Vec<JudgedSession>, InputError> {
+    judge_recording(setup, &Recording::of(path), options)
+}
+
+/// Judges each run of `recording` as a session; there is at least one.
+pub fn judge_recording(
+    setup: &Setup,
+    recording: &Recording,
+    options: &TableOptions,
+) -> Result<Vec<JudgedSession>, InputError> {
     let options = options.clone().of_rig(setup.rig.columns.as_deref());
-    let mut rows = open(path, &options)?;
-    let begin = |n_run| RecordedSession::new(setup.clone(), run_name(&session_name(path), n_run));
+    let mut rows = recording.open(&options)?;
+    let begin = |n_run| RecordedSession::new(setup.clone(), run_name(&recording.name, n_run));
     let end = |session: RecordedSession| {
-        session.end(|_| {}).map_err(|reason| InputError::file(path, reason))
+        session.end(|_| {}).map_err(|reason| InputError::new(&recording.name, reason))
     };
     let (mut ended, mut session) = (Vec::new(), begin(1));
     while let Some(row) = rows.next() {
@@ -81,26 +91,26 @@ pub fn judge_file(
         match row {
             Ok(sample) => session.sample(sample, || rows.place(), |_| {}),
             Err(SessionRowError::Rejected(row)) => session.reject(row),
-            Err(error) => return Err(InputError::file(path, error)),
+            Err(error) => return Err(recording.error(error)),
         }
     }
     ended.push(end(session)?);
     Ok(ended)
 }
 
-/// Reads the samples of each run of the session file at `path`, and the errors of its invalid rows.
+/// Reads the samples of each run of `recording`, and the errors of its invalid rows.
 pub fn read_samples(
-    path: &Path,
+    recording: &Recording,
     options: &TableOptions,
 ) -> Result<(Vec<Vec<Sample>>, Vec<String>), InputError> {
     let (mut runs, mut bad_rows) = (vec![Vec::new()], Vec::new());
-    let mut rows = open(path, options)?;
+    let mut rows = recording.open(options)?;
     while let Some(row) = rows.next() {
         runs.resize_with(rows.n_runs(), Vec::new);
         match row {
             Ok(sample) => runs.last_mut().into_iter().for_each(|run| run.push(sample)),
             Err(SessionRowError::Rejected(row)) => bad_rows.push(row.to_string()),
-            Err(error) => return Err(InputError::file(path, error)),
+            Err(error) => return Err(recording.error(error)),
         }
     }
     Ok((runs, bad_rows))

@@ -5,5 +5,6 @@ pub mod drive_cycle;
 pub mod export;
 pub mod inspect;
 pub mod judge;
+pub mod recordings;
 pub mod replay;
 pub mod trends;

@@ -4,13 +4,14 @@ mod against;
 mod verdict;
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use crate::judge::{self, JudgedSession, TableArgs};
+use crate::recordings::{JoinArgs, Recording};
 use offbd_core::diagnosis::Profile;
 use offbd_core::engine::Setup;
 use offbd_terminal::errors::{FaultFound, InputError};
@@ -27,9 +28,11 @@ use offbd_terminal::table;
     radians, metres. An empty position means that no ball was seen. For other names \
     and units give --columns; `offbd inspect FILE` proposes it. In a build with the \
     feature `parquet`, Parquet and Arrow files with these columns are read too; with `mcap`, \
-    MCAP files with messages of these keys; with `xlsx`, Excel workbooks.\n\n\
+    MCAP files with messages of these keys; with `xlsx`, Excel workbooks. JSON lists are\n\
+    read as texts are.\n\n\
     Examples:\n  \
     offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
+    offbd replay --asset learnt.json --join data-*.csv\n  \
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
     offbd replay --profile textbook sick.csv\n  \
     offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
@@ -42,9 +45,11 @@ pub struct ReplayArgs {
     /// 0.38 × 0.24 m, steel ball)]
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
-    /// Recorded sessions
+    /// Recorded sessions; of a folder all files
     #[arg(required = true, value_name = "SESSION.csv")]
     sessions: Vec<PathBuf>,
+    #[command(flatten)]
+    join: JoinArgs,
     /// A table for people, or one JSON object per line
     #[arg(long, value_enum, default_value = "table")]
     format: OutputFormat,
@@ -71,23 +76,25 @@ pub struct ReplayArgs {
 pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let setup = judge::set_up(judge::load_rig(args.asset.as_deref())?, args.profile)?;
     let against = against_setup(args)?;
-    let bar = progress(args.sessions.len());
+    let recordings = args.join.recordings(&args.sessions)?;
+    let bar = progress(recordings.len());
     let options = args.table.options();
     let judge_all = || -> Vec<Result<Vec<ComparedSession>, InputError>> {
-        let judge = |path: &PathBuf| {
-            let judged = judge::judge_file(&setup, path, &options)?;
-            let against = against.as_ref().map(|s| judge::judge_file(s, path, &options));
+        let judge = |recording: &Recording| {
+            let judged = judge::judge_recording(&setup, recording, &options)?;
+            let against = against.as_ref();
+            let against = against.map(|s| judge::judge_recording(s, recording, &options));
             let mut against = against.transpose()?.into_iter().flatten();
             bar.inc(1);
             let compared = |judged| ComparedSession { judged, against: against.next() };
             Ok(judged.into_iter().map(compared).collect())
         };
-        args.sessions.par_iter().map(judge).collect()
+        recordings.par_iter().map(judge).collect()
     };
     let results = in_threads(args.jobs, judge_all)?;
     bar.finish_and_clear();
-    for (path, result) in args.sessions.iter().zip(&results) {
-        report_rows(path, result.as_deref().unwrap_or_default());
+    for (recording, result) in recordings.iter().zip(&results) {
+        report_rows(&recording.words(), result.as_deref().unwrap_or_default());
     }
     let verdicts: Vec<&ComparedSession> = results.iter().flatten().flatten().collect();
     match args.format {
@@ -146,8 +153,7 @@ pub fn in_threads<T: Send>(
 }
 
 /// Reports rejected rows and rows that were not judged, on stderr.
-fn report_rows(path: &Path, sessions: &[ComparedSession]) {
-    let name = path.display();
+fn report_rows(name: &str, sessions: &[ComparedSession]) {
     if sessions.len() > 1 {
         output::remark(format_args!(
             "{name}: the clock starts again; its {} runs are judged as sessions",
@@ -155,7 +161,7 @@ fn report_rows(path: &Path, sessions: &[ComparedSession]) {
         ));
     }
     for ComparedSession { judged, .. } in sessions {
-        report_rows_of_run(&name.to_string(), judged);
+        report_rows_of_run(name, judged);
     }
 }
 

@@ -7,6 +7,7 @@ use clap::Args;
 use rayon::prelude::*;
 
 use crate::judge::{self, JudgedSession, TableArgs};
+use crate::recordings::JoinArgs;
 use offbd_core::diagnosis::ServoEstimate;
 use offbd_core::diagnosis::trend::{LEAST_SESSIONS, MAX_SESSIONS};
 use offbd_core::vocabulary::{Axis, PerAxis};
@@ -32,7 +33,7 @@ pub struct TrendsArgs {
     /// The rig's asset file, calibrated
     #[arg(long, value_name = "ASSET.json")]
     asset: PathBuf,
-    /// Recorded sessions of the rig, oldest first
+    /// Recorded sessions of the rig, oldest first; of a folder all files, by their names
     #[arg(required = true, value_name = "SESSION.csv")]
     sessions: Vec<PathBuf>,
     /// A table for people, or one JSON object
@@ -51,8 +52,9 @@ pub fn run(args: &TrendsArgs) -> anyhow::Result<()> {
         return Err(InputError::file(&args.asset, reason).into());
     };
     let options = args.table.options();
+    let recordings = JoinArgs::default().recordings(&args.sessions)?;
     let judged: Result<Vec<Vec<JudgedSession>>, InputError> =
-        args.sessions.par_iter().map(|path| judge::judge_file(&setup, path, &options)).collect();
+        recordings.par_iter().map(|r| judge::judge_recording(&setup, r, &options)).collect();
     let judged: Vec<JudgedSession> = judged?.into_iter().flatten().collect();
     let first = judged.len().saturating_sub(MAX_SESSIONS);
     let estimates: Vec<PerAxis<Option<ServoEstimate>>> =

@@ -81,6 +81,7 @@ pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Prob
     let essence = text.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
     let format = match essence.as_str() {
         "text/csv" => SessionFormat::Csv,
+        "application/json" | "application/x-ndjson" => SessionFormat::Json,
         "application/octet-stream" => return Ok(None),
         "application/vnd.apache.parquet" => SessionFormat::Parquet,
         "application/vnd.apache.arrow.stream" | "application/vnd.apache.arrow.file" => {
@@ -89,8 +90,7 @@ pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Prob
         "application/vnd.mcap" => SessionFormat::Mcap,
         "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet" => SessionFormat::Xlsx,
         _ => {
-            let formats = SessionFormat::ALL.iter().filter(|format| format.is_read());
-            let formats = list(&formats.copied().collect::<Vec<_>>());
+            let formats = list(&SessionFormat::ALL);
             return Err(unsupported(format!(
                 "`{text}` is no media type of an imported recording; use {formats}"
             )));

@@ -145,11 +145,11 @@ pub(super) async fn open(
 
 /// Imports a recorded file as a session: CSV or, in a build with these formats, Parquet and
 /// Arrow (streams and files without compression), with the columns of the CSV file in any
-/// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, or the first sheet
-/// of an Excel workbook, in which a time may be a date. A text may have any usual encoding,
-/// separator and decimal sign, comments and lines before the table; other names, units and a
-/// missing time of a text or a sheet are given by `columns` and `rate`. If its clock starts again, each run becomes a
-/// session. Its samples are processed like live
+/// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, the first sheet of an Excel
+/// workbook, in which a time may be a date, or a JSON document with rows or columns. A text may have
+/// any usual encoding, separator and decimal sign, comments and lines before the table; other names,
+/// units and a missing time of a text, a sheet or a JSON document are given by `columns` and `rate`.
+/// If its clock starts again, each run becomes a session. Its samples are processed like live
 /// telemetry. The asset's open session is ended first, and the new session is ended after
 /// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
 /// others wait. Of a file that is damaged, ends too early or expands too far, or if the
@@ -158,6 +158,7 @@ pub(super) async fn open(
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
     request_body(content((String = "text/csv"), (BinaryFile = "application/octet-stream"),
+        (serde_json::Value = "application/json"),
         (BinaryFile = "application/vnd.apache.parquet"),
         (BinaryFile = "application/vnd.apache.arrow.stream"),
         (BinaryFile = "application/vnd.mcap"),

@@ -22,6 +22,7 @@ use offbd_core::diagnosis::Profile;
 use offbd_core::engine::Setup;
 use offbd_file_cli::calibrate;
 use offbd_file_cli::judge::{self, JudgedSession};
+use offbd_file_cli::recordings::Recording;
 use offbd_file_cli::replay::{in_threads, progress};
 use offbd_terminal::errors::InputError;
 use offbd_terminal::output::{self, OutputFormat, value_parser};
@@ -116,7 +117,7 @@ fn set_up(args: &ScoreArgs, folder: &Path) -> Result<Setup, InputError> {
     let mut rig = judge::load_rig(Some(&folder.join("rig.json")))?;
     if !args.no_calibration {
         let path = folder.join("calibration.csv");
-        let (samples, _) = judge::read_samples(&path, &TableOptions::default())?;
+        let (samples, _) = judge::read_samples(&Recording::of(&path), &TableOptions::default())?;
         let data = calibrate::data_hash(std::slice::from_ref(&path))?;
         let learnt = calibrate::learn(&rig, &samples, &data);
         rig.calibration = Some(Box::new(learnt.map_err(|e| InputError::file(&path, e))?));

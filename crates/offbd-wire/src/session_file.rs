@@ -13,6 +13,7 @@ mod arrow;
 mod byte_budget;
 #[cfg(feature = "parquet")]
 mod columns;
+pub(crate) mod json;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
@@ -46,7 +47,8 @@ use super::telemetry::sample_view;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionFormat {
     Csv,
-    /// JSON rows, as `GET /sessions/{id}/telemetry` sends them; only written.
+    /// JSON rows or columns (`session_file/json.rs`); written as `GET /sessions/{id}/telemetry`
+    /// sends them.
     Json,
     Parquet,
     /// An Arrow stream; an Arrow file is read, too.
@@ -90,12 +92,6 @@ impl SessionFormat {
         }
     }
 
-    /// Whether files of the format are read.
-    #[must_use]
-    pub const fn is_read(self) -> bool {
-        !matches!(self, Self::Json)
-    }
-
     /// Checks that this build of offbd has the format.
     ///
     /// # Errors
@@ -130,7 +126,8 @@ impl SessionFormat {
             (b"PK\x03\x04", SessionFormat::Xlsx),
         ];
         let found = SIGNATURES.iter().find(|(signature, _)| head.starts_with(signature));
-        found.map_or(Self::Csv, |(_, format)| *format)
+        let text = if is_json(head) { Self::Json } else { Self::Csv };
+        found.map_or(text, |(_, format)| *format)
     }
 }
 
@@ -144,6 +141,18 @@ impl fmt::Display for SessionFormat {
             Self::Mcap => "MCAP",
             Self::Xlsx => "Excel",
         })
+    }
+}
+
+/// Whether a file that begins with `head` is a JSON document with rows or columns.
+fn is_json(head: &[u8]) -> bool {
+    let head = head.strip_prefix("\u{feff}".as_bytes()).unwrap_or(head);
+    let mut bytes = head.iter().filter(|byte| !byte.is_ascii_whitespace());
+    match bytes.next() {
+        Some(b'{') => true,
+        // A column may be named `[s]`.
+        Some(b'[') => bytes.next().is_some_and(|byte| b"{[\"".contains(byte)),
+        _ => false,
     }
 }
 
@@ -171,8 +180,6 @@ const OPEN_DOCUMENT: &[u8] = b"mimetypeapplication/vnd.oasis.opendocument";
 
 const AS_XLSX: &str = "save it as .xlsx or as CSV in the spreadsheet program";
 const AS_CSV: &str = "write it as CSV, with the columns t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m";
-const AS_BATCHES: &str =
-    "send it in batches (`POST /api/v1/assets/NAME/telemetry`), or write it as CSV";
 const AS_RECORDING: &str = "a recording is a table of times, commands and positions";
 
 /// Checks that a file that begins with `head` is not one of another program.
@@ -184,18 +191,8 @@ pub(crate) fn check_own(head: &[u8]) -> Result<(), SessionFileError> {
         let is_here = head.windows(OPEN_DOCUMENT.len()).any(|bytes| bytes == OPEN_DOCUMENT);
         is_here.then_some(("an OpenDocument file", AS_XLSX))
     };
-    let json = || {
-        let mut bytes = head.iter().filter(|byte| !byte.is_ascii_whitespace());
-        // A column may be named `[s]`.
-        let is_json = match bytes.next() {
-            Some(b'{') => true,
-            Some(b'[') => bytes.next().is_some_and(|byte| b"{[\"".contains(byte)),
-            _ => false,
-        };
-        is_json.then_some(("a JSON document", AS_BATCHES))
-    };
     let found = FOREIGN.iter().find(|(signature, ..)| head.starts_with(signature));
-    match found.map(|(_, what, advice)| (*what, *advice)).or_else(open_document).or_else(json) {
+    match found.map(|(_, what, advice)| (*what, *advice)).or_else(open_document) {
         Some((what, advice)) => Err(SessionFileError::Foreign { what, advice }),
         None => Ok(()),
     }
@@ -213,8 +210,6 @@ pub enum SessionFileError {
     /// A file of another program.
     #[error("this is {what}, not a recording; {advice}")]
     Foreign { what: &'static str, advice: &'static str },
-    #[error("{0} files are only written, not read")]
-    NotRead(SessionFormat),
     #[error("{0} files are only read, not written")]
     NotWritten(SessionFormat),
     #[error("there is no column `{0}`; required: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
@@ -227,6 +222,11 @@ pub enum SessionFileError {
     /// The first sheet of a workbook is no session.
     #[error("sheet `{sheet}`: {reason}")]
     Sheet { sheet: String, reason: String },
+    /// Files that are not one recording.
+    #[error("{0}")]
+    Unfit(String),
+    #[error("the JSON document is not a recording: {0}")]
+    Json(String),
     /// An MCAP file without a topic of the schema.
     #[error("there is no topic with JSON messages of the schema `{0}`")]
     NoTopic(&'static str),
@@ -237,6 +237,8 @@ pub enum SessionFileError {
     /// A part of the file that must be in memory as a whole is too large.
     #[error("{what} of the file has {found} bytes; at most {limit} are read")]
     TooLarge { what: &'static str, found: u64, limit: u64 },
+    #[error("{what} has more than {limit} bytes; at most that many are read")]
+    TooLong { what: &'static str, limit: u64 },
     /// What is decompressed or kept of the file is too much.
     #[error("{what} expands to more than {limit} bytes; at most that many are read")]
     Expands { what: &'static str, limit: u64 },
@@ -340,7 +342,11 @@ pub fn open<S: Read + Seek + Send + 'static>(
     if format == SessionFormat::Csv {
         // A pipe cannot go back to its start.
         let source = io::Cursor::new(head).chain(source);
-        return Ok(Box::new(CsvRows(TableReader::recording(source, options)?)));
+        return Ok(Box::new(TextRows::new(TextKind::Text, source, options)?));
+    }
+    if format == SessionFormat::Json {
+        let table = json::table(io::Cursor::new(head).chain(source))?;
+        return Ok(Box::new(TextRows::new(table.kind(), io::Cursor::new(table.text), options)?));
     }
     source.seek(SeekFrom::Start(0))?;
     match format {
@@ -351,36 +357,111 @@ pub fn open<S: Read + Seek + Send + 'static>(
         #[cfg(feature = "mcap")]
         SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source)?)),
         #[cfg(feature = "xlsx")]
-        SessionFormat::Xlsx => Ok(Box::new(xlsx::SheetRows::new(xlsx::sheet(source)?, options)?)),
-        _ => {
-            format.check()?;
-            Err(SessionFileError::NotRead(format))
+        SessionFormat::Xlsx => {
+            let xlsx::Sheet { name, text } = xlsx::sheet(source)?;
+            Ok(Box::new(TextRows::new(TextKind::Sheet(name), io::Cursor::new(text), options)?))
+        }
+        _ => Err(format.not_built()),
+    }
+}
+
+/// What a text was in the file.
+pub(crate) enum TextKind {
+    /// The file, whose rows are known by their lines.
+    Text,
+    /// A JSON document, whose first row comes after this many lines.
+    Json { n_before: u64 },
+    /// The sheet of this name.
+    #[cfg_attr(not(feature = "xlsx"), expect(dead_code, reason = "of workbooks"))]
+    Sheet(String),
+}
+
+/// The rows of a text, or of another file that is read as one.
+pub(crate) struct TextRows<'a> {
+    kind: TextKind,
+    rows: TableReader<'a>,
+}
+
+impl<'a> TextRows<'a> {
+    /// Reads a text by `options`.
+    ///
+    /// # Errors
+    /// [`SessionFileError::Csv`], or [`SessionFileError::Sheet`] of a sheet.
+    pub(crate) fn new(
+        kind: TextKind,
+        source: impl Read + Send + 'a,
+        options: &TableOptions,
+    ) -> Result<Self, SessionFileError> {
+        match (TableReader::recording(source, options), kind) {
+            (Ok(rows), kind) => Ok(Self { kind, rows }),
+            (Err(error), TextKind::Sheet(sheet)) => {
+                Err(SessionFileError::Sheet { sheet, reason: error.to_string() })
+            }
+            (Err(error), _) => Err(error.into()),
+        }
+    }
+
+    fn place_of(&self, line: u64) -> RowPlace {
+        match self.kind {
+            TextKind::Text => RowPlace::Line(line),
+            TextKind::Json { n_before } => RowPlace::Row(line.saturating_sub(n_before)),
+            TextKind::Sheet(_) => RowPlace::Row(line),
         }
     }
 }
 
-/// The rows of a text.
-pub(crate) struct CsvRows<'a>(pub(crate) TableReader<'a>);
-
-impl Iterator for CsvRows<'_> {
+impl Iterator for TextRows<'_> {
     type Item = Result<Sample, SessionRowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let rejected = |RowError { line, reason }| {
-            SessionRowError::Rejected(RejectedRow { place: RowPlace::Line(line), reason })
-        };
-        self.0.next().map(|row| row.map_err(rejected))
+        let row = self.rows.next()?;
+        Some(row.map_err(|RowError { line, reason }| {
+            let reason = match &self.kind {
+                TextKind::Sheet(name) => format!("sheet `{name}`, {reason}"),
+                TextKind::Text | TextKind::Json { .. } => reason,
+            };
+            SessionRowError::Rejected(RejectedRow { place: self.place_of(line), reason })
+        }))
     }
 }
 
-impl SessionRows for CsvRows<'_> {
+impl SessionRows for TextRows<'_> {
     fn place(&self) -> RowPlace {
-        RowPlace::Line(self.0.line())
+        self.place_of(self.rows.line())
     }
 
     fn n_runs(&self) -> usize {
-        self.0.n_runs()
+        self.rows.n_runs()
     }
+}
+
+/// Bytes of a cell of a sheet or a JSON document that are read. Chosen: names and numbers are
+/// shorter, and many cells may have one long text.
+const LONGEST_CELL: usize = 200;
+
+/// Returns a text as one line, as a row is one; of a long text the beginning and a sign of that.
+fn line_of(text: &str) -> String {
+    let mut chars = text.chars();
+    let line = chars.by_ref().take(LONGEST_CELL).map(|c| if c.is_control() { ' ' } else { c });
+    let mut line: String = line.collect();
+    line.extend(chars.next().map(|_| '…'));
+    line
+}
+
+/// Writes a line of a CSV text. A cell is one line.
+fn write_line<'a>(text: &mut Vec<u8>, cells: impl Iterator<Item = &'a str>) {
+    for (i, cell) in cells.enumerate() {
+        text.extend((i > 0).then_some(b','));
+        // A line that begins with one of these signs may be a comment.
+        if cell.contains([',', '"']) || cell.starts_with(['#', '%']) {
+            text.push(b'"');
+            text.extend_from_slice(cell.replace('"', "\"\"").as_bytes());
+            text.push(b'"');
+        } else {
+            text.extend_from_slice(cell.as_bytes());
+        }
+    }
+    text.push(b'\n');
 }
 
 /// What a file says about its session, beside the samples.
@@ -533,7 +614,6 @@ mod tests {
             (b"\x89HDF\r\n\x1a\n", "an HDF5 or MATLAB file, not a recording; write it as CSV"),
             (b"MATLAB 5.0 MAT-file, Platform", "a MATLAB file"),
             (b"\x1f\x8b\x08", "a gzip file, not a recording; unpack it first"),
-            (b"\n [{\"t_s\": 0}]", "a JSON document, not a recording; send it in batches"),
             (b"\x89PNG\r\n\x1a\n", "a picture"),
         ] {
             let error = check_own(head).unwrap_err().to_string();
@@ -543,6 +623,14 @@ mod tests {
             [&b"t_s,x_m\n"[..], b"", b"PK\x03\x04", b"PAR1", b"\x89MCAP0\r\n", b"\xff\xfet\0"]
         {
             assert!(check_own(own).is_ok(), "{own:?}");
+        }
+        for (head, format) in [
+            (&b"\n [{\"t_s\": 0}]"[..], SessionFormat::Json),
+            (b"{\"t_s\": [0]}", SessionFormat::Json),
+            (b"[[0, 1]]", SessionFormat::Json),
+            (b"[s],[m]\n0,1\n", SessionFormat::Csv),
+        ] {
+            assert_eq!(SessionFormat::of(head), format, "{head:?}");
         }
     }
 }

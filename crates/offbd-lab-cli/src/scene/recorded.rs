@@ -12,6 +12,7 @@ use super::{plots, report, words};
 use offbd_core::engine::{FreeRunPoint, free_run};
 use offbd_core::plant::SimulatedTwin;
 use offbd_core::vocabulary::{Axis, in_range};
+use offbd_file_cli::recordings::Recording;
 use offbd_file_cli::{calibrate, judge};
 use offbd_lab::chart::Figure;
 use offbd_terminal::errors::{BadArgument, InputError};
@@ -63,7 +64,7 @@ impl RecordedRun {
         in_range("--step", step_s, SimulatedTwin::STEPS_S)
             .map_err(|e| BadArgument(e.to_string()))?;
         let setup = judge::set_up(judge::load_rig(args.recorded.asset.as_deref())?, None)?;
-        let samples = calibrate::load(&[path.to_owned()], &TableOptions::default())?.concat();
+        let samples = calibrate::load(&[Recording::of(path)], &TableOptions::default())?.concat();
         let points = free_run(&setup, &samples, step_s).map_err(|e| InputError::file(path, e))?;
         let Some(&end) = points.last() else {
             return Err(InputError::file(path, "has no usable sample").into());

@@ -5,17 +5,13 @@
 //! only as long as it borrows the workbook, so the text is in memory; how much the workbook may
 //! take is checked before (`workbook_check.rs`).
 
-use std::io::{Cursor, Read, Seek};
+use std::io::{Read, Seek};
 
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
 use jiff::Timestamp;
 
 use super::workbook_check;
-use super::{
-    RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
-};
-use crate::table::{RowError, TableOptions, TableReader};
-use offbd_core::vocabulary::Sample;
+use super::{SessionFileError, SessionFormat, guarded, line_of, write_line};
 
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.
 const EPOCH_DAYS: [f64; 2] = [25_569.0, 24_107.0];
@@ -27,10 +23,6 @@ const MAX_ROWS: u32 = 1 << 20;
 
 /// Longest text of a sheet, bytes. Chosen: a million rows of six numbers with all their digits.
 const MAX_SHEET_BYTES: usize = 128 << 20;
-
-/// Characters of a cell that are read. Chosen: names and numbers are shorter, and many cells may
-/// name one long text.
-const LONGEST_CELL: usize = 200;
 
 pub(super) fn damaged(reason: impl ToString) -> SessionFileError {
     SessionFileError::Damaged { format: SessionFormat::Xlsx, reason: reason.to_string() }
@@ -53,15 +45,6 @@ fn cell_text(cell: &DataRef<'_>, is_1904: bool) -> String {
         DataRef::Bool(value) => value.to_string(),
         DataRef::Error(error) => error.to_string(),
     }
-}
-
-/// Returns a text as one line, as a row is one; of a long text the beginning and a sign of that.
-fn line_of(text: &str) -> String {
-    let mut chars = text.chars();
-    let line = chars.by_ref().take(LONGEST_CELL).map(|c| if c.is_control() { ' ' } else { c });
-    let mut line: String = line.collect();
-    line.extend(chars.next().map(|_| '…'));
-    line
 }
 
 /// Returns a date or a time of day, to the microsecond that the fraction of a day resolves; seconds
@@ -152,9 +135,7 @@ impl Lines<'_> {
         if !self.cells.is_empty() {
             self.width = self.width.max(self.cells.len());
             self.cells.resize(self.width, String::new());
-            let mut line = csv::WriterBuilder::new().from_writer(&mut self.text);
-            line.write_record(&self.cells).map_err(damaged)?;
-            line.flush()?;
+            write_line(&mut self.text, self.cells.iter().map(String::as_str));
             self.cells.clear();
         } else {
             self.text.push(b'\n');
@@ -164,47 +145,5 @@ impl Lines<'_> {
             return Err(SessionFileError::Expands { what: "the first sheet", limit });
         }
         Ok(())
-    }
-}
-
-/// The rows of the first sheet.
-pub(super) struct SheetRows {
-    sheet: String,
-    rows: TableReader<'static>,
-}
-
-impl SheetRows {
-    /// Reads a sheet by `options`.
-    ///
-    /// # Errors
-    /// [`SessionFileError::Sheet`] if a column is missing.
-    pub(super) fn new(sheet: Sheet, options: &TableOptions) -> Result<Self, SessionFileError> {
-        let Sheet { name, text } = sheet;
-        match TableReader::recording(Cursor::new(text), options) {
-            Ok(rows) => Ok(Self { sheet: name, rows }),
-            Err(error) => Err(wrong(&name, error)),
-        }
-    }
-}
-
-impl Iterator for SheetRows {
-    type Item = Result<Sample, SessionRowError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let rejected = |RowError { line, reason }| {
-            let reason = format!("sheet `{}`, {reason}", self.sheet);
-            SessionRowError::Rejected(RejectedRow { place: RowPlace::Row(line), reason })
-        };
-        self.rows.next().map(|row| row.map_err(rejected))
-    }
-}
-
-impl SessionRows for SheetRows {
-    fn place(&self) -> RowPlace {
-        RowPlace::Row(self.rows.line())
-    }
-
-    fn n_runs(&self) -> usize {
-        self.rows.n_runs()
     }
 }

@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::expression::ColumnMapping;
-use super::{CsvError, OpenedTable, TableOptions, TableReader, find_table, guess};
+use super::{CsvError, OpenedTable, TableOptions, find_table, guess};
 use crate::session_csv::COLUMNS;
 use crate::session_file::{
-    self, CsvRows, HEAD_BYTES, SessionFileError, SessionFormat, SessionRowError, SessionRows,
+    self, HEAD_BYTES, SessionFileError, SessionFormat, SessionRowError, SessionRows, TextKind,
+    TextRows,
 };
 use crate::telemetry::{SampleView, sample_view};
 use offbd_core::vocabulary::Sample;
@@ -84,7 +85,7 @@ pub struct InspectedMotionView {
 /// What a recording holds, and how its columns would be read.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct InspectionView {
-    /// `CSV`, `Parquet`, `Arrow`, `MCAP` or `Excel`.
+    /// `CSV`, `JSON`, `Parquet`, `Arrow`, `MCAP` or `Excel`.
     pub format: String,
     /// How a text is written: encoding, separator, decimal commas, lines before the table.
     pub layout: Vec<String>,
@@ -141,6 +142,11 @@ pub fn inspect(
         let sheet = session_file::xlsx::sheet(source)?;
         view.layout.push(format!("the sheet `{}`", sheet.name));
         return inspect_text(view, std::io::Cursor::new(sheet.text), options);
+    }
+    if format == SessionFormat::Json {
+        let table = session_file::json::table(source)?;
+        view.layout.push(table.layout.to_owned());
+        return inspect_text(view, std::io::Cursor::new(table.text), options);
     }
     if format != SessionFormat::Csv {
         let rows = &mut *session_file::open(source, Some(format), options)?;
@@ -210,13 +216,13 @@ fn read_table(
 ) -> Result<Vec<Sample>, SessionFileError> {
     source.rewind()?;
     let options = TableOptions { columns: mapping.clone(), rate_hz, ..TableOptions::default() };
-    match TableReader::recording(source, &options) {
-        Ok(rows) => read(view, &mut CsvRows(rows)),
-        Err(CsvError::MissingColumn { name, .. }) => {
+    match TextRows::new(TextKind::Text, source, &options) {
+        Ok(mut rows) => read(view, &mut rows),
+        Err(SessionFileError::Csv(CsvError::MissingColumn { name, .. })) => {
             view.remark(format!("no column is likely to be `{name}`; map one"));
             Ok(Vec::new())
         }
-        Err(error) => Err(error.into()),
+        Err(error) => Err(error),
     }
 }
 

@@ -6,6 +6,7 @@ import { useFileDrop, type Dropped } from "./use-file-drop";
 /** The suffixes of the names of the files that are proposed, by format; others can be chosen, too. */
 const SUFFIXES: [FormatName, string][] = [
   ["csv", ".csv,.txt,.tsv,text/csv"],
+  ["json", ".json,.jsonl,.ndjson"],
   ["xlsx", ".xlsx"],
   ["parquet", ".parquet"],
   ["arrow", ".arrow,.arrows"],
