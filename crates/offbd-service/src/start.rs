@@ -203,6 +203,7 @@ impl WayToWriter {
         let committer = Committer {
             writer,
             queue,
+            pace: Pace::default(),
             transfers: transfer_requests,
             ownership: ownership.clone(),
             lost: lost_sender,

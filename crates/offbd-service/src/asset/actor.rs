@@ -9,7 +9,7 @@ use crate::writing::EngineGeneration;
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::FaultCode;
-use offbd_store::{AssetRow, Snapshot};
+use offbd_store::{AssetRow, Micros, Snapshot};
 use offbd_wire::stored::StoredProvenance;
 
 /// The provenance of each code's fault memory entry, in the order of [`FaultCode::ALL`].
@@ -30,6 +30,8 @@ pub(crate) struct Asset {
     /// Rows of the batch that is being recorded that are no samples, and that the engine has
     /// not been told of yet.
     pub(super) malformed: Vec<usize>,
+    /// When the last batch arrived.
+    pub(super) batch_at: Option<Micros>,
     /// The last sessions that have ended, the newest first.
     pub(super) ended: Vec<EndedSession>,
     /// Whether it has, or may have had, any session.

@@ -10,9 +10,13 @@ use super::turn::Turn;
 use crate::ServiceError;
 use offbd_core::engine::{Admission, Recognition, Rejection};
 use offbd_core::vocabulary::Sample;
-use offbd_store::Write;
+use offbd_store::{Micros, Write};
 use offbd_wire::telemetry::{AckView, Batch, RowView};
 use offbd_wire::words::UnjudgedWord;
+
+/// Time since the batch before from which on a device sends at its own pace, µs: one that waits for
+/// the acknowledgement sends sooner. Chosen: several times what a commit may wait for others.
+const OWN_PACE: Micros = 16_000;
 
 impl Asset {
     /// Evaluates and records a batch; `importing` is set for a recording that is being
@@ -23,6 +27,8 @@ impl Asset {
         importing: bool,
         turn: &mut Turn<'_>,
     ) -> Result<AckView, ServiceError> {
+        let before = self.batch_at.replace(turn.at);
+        turn.can_wait = before.is_some_and(|before| turn.at - before >= OWN_PACE);
         let mut ack = AckView::default();
         let (samples, malformed) = samples(batch.rows, &mut ack);
         let n_malformed = malformed.len();

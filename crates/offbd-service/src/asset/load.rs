@@ -113,6 +113,7 @@ impl TryFrom<AssetRecord> for StoredAsset {
             session_rate: SessionRate::default(),
             link: LinkHealth::default(),
             malformed: Vec::new(),
+            batch_at: None,
             ended: ended.into_iter().map(EndedSession::stored).collect(),
             has_sessions,
             learning,

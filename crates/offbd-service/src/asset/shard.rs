@@ -254,7 +254,7 @@ impl Shard {
         {
             let (generation, completion) = (asset.generation.clone(), Box::new(|_| ()));
             let partition = Some(self.env.handles.ownership.partition_of(&asset.row.name));
-            room.send(WriteSet { partition, writes, generation, completion });
+            room.send(WriteSet { partition, writes, can_wait: false, generation, completion });
         }
     }
 
@@ -452,6 +452,7 @@ mod tests {
             session_rate: SessionRate::default(),
             link: LinkHealth::default(),
             malformed: Vec::new(),
+            batch_at: None,
             ended: Vec::new(),
             has_sessions: false,
             learning: Default::default(),

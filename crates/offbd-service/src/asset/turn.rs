@@ -28,6 +28,8 @@ pub(super) struct Turn<'a> {
     /// Whether the engine's state has changed: if the command fails afterwards, the
     /// engine is ahead of the store.
     pub(super) engine_changed: bool,
+    /// Whether the changes may be committed some milliseconds later, together with others.
+    pub(super) can_wait: bool,
     /// Jobs to queue once the writes are durable, each with its room in the queue.
     pub(super) jobs: Vec<(JobRoom, NewJob)>,
     /// The engine that the changes belong to.
@@ -53,6 +55,7 @@ impl<'a> Turn<'a> {
             at: env.handles.clock.now(),
             writes: Vec::new(),
             engine_changed: false,
+            can_wait: false,
             jobs: Vec::new(),
             is_behind: generation.has_unsettled(),
             generation: generation.clone(),
@@ -73,7 +76,7 @@ impl<'a> Turn<'a> {
     /// Submits the changes to the writer. Once they are durable, the jobs are queued and
     /// `answer` is sent to `reply`.
     pub(super) fn commit<T: Send + 'static>(self, asset: &str, answer: T, reply: Reply<T>) {
-        let Self { env, writes, jobs, generation, room, .. } = self;
+        let Self { env, writes, can_wait, jobs, generation, room, .. } = self;
         let completion = Box::new(move |outcome: Result<(), ServiceError>| {
             if outcome.is_ok() {
                 jobs.into_iter().for_each(|(room, job)| room.put(job));
@@ -81,7 +84,7 @@ impl<'a> Turn<'a> {
             reply.send(outcome.map(|()| answer));
         });
         let partition = Some(env.handles.ownership.partition_of(asset));
-        room.send(WriteSet { partition, writes, generation, completion });
+        room.send(WriteSet { partition, writes, can_wait, generation, completion });
     }
 }
 

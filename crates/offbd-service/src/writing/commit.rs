@@ -11,6 +11,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::Instrument;
 
 use super::events::{Event, Events};
+use super::pace::Pace;
 use super::transfer::TransferRequest;
 use crate::ownership::Ownership;
 use crate::{Reasons, ServiceError};
@@ -76,6 +77,9 @@ pub(crate) struct WriteSet {
     /// The partition of the asset; `None` for changes that concern none.
     pub(crate) partition: Option<PartitionId>,
     pub(crate) writes: Vec<Write>,
+    /// Whether nobody is held up if it is committed some milliseconds later: it is of a device
+    /// that sends at its own pace, not as fast as it is acknowledged.
+    pub(crate) can_wait: bool,
     pub(crate) generation: EngineGeneration,
     pub(crate) completion: Completion,
 }
@@ -84,6 +88,7 @@ pub(crate) struct WriteSet {
 pub(crate) struct Committer {
     pub(crate) writer: Writer,
     pub(crate) queue: mpsc::Receiver<WriteSet>,
+    pub(crate) pace: Pace,
     pub(crate) transfers: mpsc::Receiver<TransferRequest>,
     pub(crate) ownership: Ownership,
     /// Receives the partitions that other nodes have taken. Has room for all.
@@ -159,6 +164,7 @@ impl Committer {
                     if n_sets == 0 {
                         return Some(self.writer);
                     }
+                    self.pace.gather(&mut self.queue, &mut group, MAX_GROUP_SETS).await;
                     self.commit(std::mem::take(&mut group)).await && self.fold().await
                 }
             };

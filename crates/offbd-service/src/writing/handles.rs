@@ -126,7 +126,7 @@ impl Handles {
             let _ = sender.send(outcome);
         });
         let generation = EngineGeneration::default();
-        let set = WriteSet { partition, writes, generation, completion };
+        let set = WriteSet { partition, writes, can_wait: false, generation, completion };
         let closing = ServiceError::Unavailable { what: "the service is shutting down" };
         self.writer.send(set).await.map_err(|_| closing)?;
         receiver.await.unwrap_or_else(|_| Err(stopped()))
@@ -208,7 +208,8 @@ impl Handles {
             is_stuck.store(false, Ordering::SeqCst);
         });
         let generation = EngineGeneration::default();
-        (WriteSet { partition: None, writes: Vec::new(), generation, completion }, done)
+        let (partition, writes) = (None, Vec::new());
+        (WriteSet { partition, writes, can_wait: false, generation, completion }, done)
     }
 
     async fn passed(&self, mut done: oneshot::Receiver<()>) -> Result<(), ServiceError> {

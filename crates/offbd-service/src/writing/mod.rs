@@ -4,6 +4,7 @@
 mod commit;
 mod events;
 mod handles;
+mod pace;
 mod transfer;
 
 pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, WriteSet};
