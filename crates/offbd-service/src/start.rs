@@ -20,7 +20,7 @@ use super::mutes::Mutes;
 use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
-use super::writing::{Committer, Events, FIRST_RETRY, Handles, Transfers};
+use super::writing::{Committer, Events, FIRST_RETRY, Handles, Pace, Transfers};
 use super::{Clock, Limits, Reasons, ServiceError, snapshots};
 use offbd_store::{MAX_PARTITIONS, NodeIdentity, PartitionId, Store, Write, Writer};
 

@@ -101,13 +101,20 @@ async fn a_silent_rig_is_retained_until_its_data_are_back_and_later_faults_follo
     assert_eq!((&lost["asset"], &lost["status"]), (&"a".into(), &"confirmed".into()));
     assert_eq!(retained(mosquitto.port, None).await[silence], lost);
 
-    fixture.client.telemetry("a", Some("s"), &samples[100..]).await;
+    // Data are back only as long as they keep arriving.
+    let client = fixture.client.clone();
+    let sending = tokio::spawn(async move {
+        for batch in samples[100..].chunks(50) {
+            client.telemetry("a", Some("s"), batch).await;
+        }
+    });
     let (mut is_removed, mut is_faulty) = (false, false);
     while !(is_removed && is_faulty) {
         let message = early.next().await;
         is_removed |= message.topic == silence && message.payload.is_empty();
         is_faulty |= message.topic == servo;
     }
+    sending.await.unwrap();
 }
 
 /// Through the gateway of a NATS server, by which it can retain messages too, and which hands

@@ -11,4 +11,5 @@ pub(super) use commit::{Committer, EngineGeneration, FIRST_RETRY, WriteSet};
 pub use events::{Event, EventFeed, EventKind};
 pub(super) use events::{Events, line};
 pub(super) use handles::Handles;
+pub(super) use pace::Pace;
 pub(super) use transfer::{TransferRequest, Transfers};
