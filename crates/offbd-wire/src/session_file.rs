@@ -14,6 +14,7 @@ mod byte_budget;
 #[cfg(feature = "parquet")]
 mod columns;
 pub(crate) mod json;
+mod line;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
@@ -433,35 +434,6 @@ impl SessionRows for TextRows<'_> {
     fn n_runs(&self) -> usize {
         self.rows.n_runs()
     }
-}
-
-/// Bytes of a cell of a sheet or a JSON document that are read. Chosen: names and numbers are
-/// shorter, and many cells may have one long text.
-const LONGEST_CELL: usize = 200;
-
-/// Returns a text as one line, as a row is one; of a long text the beginning and a sign of that.
-fn line_of(text: &str) -> String {
-    let mut chars = text.chars();
-    let line = chars.by_ref().take(LONGEST_CELL).map(|c| if c.is_control() { ' ' } else { c });
-    let mut line: String = line.collect();
-    line.extend(chars.next().map(|_| '…'));
-    line
-}
-
-/// Writes a line of a CSV text. A cell is one line.
-fn write_line<'a>(text: &mut Vec<u8>, cells: impl Iterator<Item = &'a str>) {
-    for (i, cell) in cells.enumerate() {
-        text.extend((i > 0).then_some(b','));
-        // A line that begins with one of these signs may be a comment.
-        if cell.contains([',', '"']) || cell.starts_with(['#', '%']) {
-            text.push(b'"');
-            text.extend_from_slice(cell.replace('"', "\"\"").as_bytes());
-            text.push(b'"');
-        } else {
-            text.extend_from_slice(cell.as_bytes());
-        }
-    }
-    text.push(b'\n');
 }
 
 /// What a file says about its session, beside the samples.

@@ -16,7 +16,8 @@ use std::io::Read;
 use serde::de::{self, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
-use super::{LONGEST_CELL, SessionFileError, SessionFormat, TextKind, line_of, write_line};
+use super::line::{LONGEST_CELL, line_of, write_line};
+use super::{SessionFileError, SessionFormat, TextKind};
 
 /// Longest document, bytes. Chosen: a million rows of five numbers with their names.
 const MAX_JSON_BYTES: u64 = 128 << 20;

@@ -10,8 +10,9 @@ use std::io::{Read, Seek};
 use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
 use jiff::Timestamp;
 
+use super::line::{line_of, write_line};
 use super::workbook_check;
-use super::{SessionFileError, SessionFormat, guarded, line_of, write_line};
+use super::{SessionFileError, SessionFormat, guarded};
 
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.
 const EPOCH_DAYS: [f64; 2] = [25_569.0, 24_107.0];
