@@ -281,6 +281,8 @@ pub enum LeftOutReason {
     Jumped,
     /// The readings were held or missing, and then jumped.
     Held,
+    /// The ball stood where the plate would have moved it.
+    Stood,
 }
 
 /// Learnt properties of the sensor.
@@ -605,6 +607,7 @@ fn left_out(view: &LeftOutView) -> LeftOut {
     let reason = match view.reason {
         LeftOutReason::Jumped => Contradiction::Jumped,
         LeftOutReason::Held => Contradiction::Held,
+        LeftOutReason::Stood => Contradiction::Stood,
     };
     LeftOut { session: view.session, from_s: view.from_s, to_s: view.to_s, reason }
 }
@@ -613,6 +616,7 @@ fn left_out_view(moment: &LeftOut) -> LeftOutView {
     let reason = match moment.reason {
         Contradiction::Jumped => LeftOutReason::Jumped,
         Contradiction::Held => LeftOutReason::Held,
+        Contradiction::Stood => LeftOutReason::Stood,
     };
     LeftOutView { session: moment.session, from_s: moment.from_s, to_s: moment.to_s, reason }
 }

@@ -154,6 +154,8 @@ pub enum Contradiction {
     Jumped,
     /// The readings repeated the last one, or were missing, and then jumped.
     Held,
+    /// The ball stood where the plate would have moved it.
+    Stood,
 }
 
 /// A moment of the data that contradicts the rest and was not learnt from.
@@ -181,6 +183,7 @@ impl fmt::Display for Contradiction {
         f.write_str(match self {
             Self::Jumped => "readings jumped",
             Self::Held => "readings were held or missing, then jumped",
+            Self::Stood => "the ball stood on a tilted plate, as if something held it",
         })
     }
 }

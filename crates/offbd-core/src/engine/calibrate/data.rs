@@ -7,7 +7,7 @@
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
 
-use super::CannotCalibrate;
+use super::{CannotCalibrate, MOVING_M};
 use crate::diagnosis::{Contradiction, LeftOut, Settings};
 use crate::vocabulary::Sample;
 
@@ -63,7 +63,29 @@ impl Data {
         let reason = held_s.map_or(Contradiction::Jumped, |_| Contradiction::Held);
         // Both sides of it are judged apart only if it is a gap.
         let to_s = certain_s.max(from_s + gap_s(samples));
-        let mut moment = LeftOut { session, from_s, to_s, reason };
+        self.leave_out(LeftOut { session, from_s, to_s, reason })
+    }
+
+    /// Leaves out the time for which the ball of session number `session` had stood since
+    /// `since_s` when that was certain, at `certain_s`, until it moves on. Returns what is left out
+    /// there; `None` if no sample is in it.
+    ///
+    /// # Errors
+    /// [`CannotCalibrate::Contradictory`] if that is too much of it.
+    pub(super) fn leave_out_stop(
+        &mut self,
+        session: usize,
+        since_s: f64,
+        certain_s: f64,
+    ) -> Result<Option<LeftOut>, CannotCalibrate> {
+        let to_s = moves_on_s(&self.sessions[session - 1], certain_s);
+        self.leave_out(LeftOut { session, from_s: since_s, to_s, reason: Contradiction::Stood })
+    }
+
+    /// Leaves out a moment, together with those next to it.
+    fn leave_out(&mut self, mut moment: LeftOut) -> Result<Option<LeftOut>, CannotCalibrate> {
+        let session = moment.session;
+        let samples = &mut self.sessions[session - 1];
         let near = |other: &LeftOut| {
             other.session == session
                 && other.from_s <= moment.to_s + APART_S
@@ -92,7 +114,12 @@ impl Data {
 
     /// Checks that not too much is left out of `session`.
     fn check_share(&self, session: usize) -> Result<(), CannotCalibrate> {
-        let of_session = || self.left_out.iter().filter(|m| m.session == session);
+        let is_stop = |m: &&LeftOut| m.reason == Contradiction::Stood;
+        let mut stops = self.left_out.iter().filter(|m| m.session == session).filter(is_stop);
+        if let (Some(first), n @ 1..) = (stops.next(), stops.count()) {
+            return Err(CannotCalibrate::Sticks { session, n: n + 1, from_s: first.from_s });
+        }
+        let of_session = || self.left_out.iter().filter(|m| m.session == session && !is_stop(m));
         let left_out_s: f64 = of_session().map(|m| m.to_s - m.from_s).sum();
         let share = left_out_s / self.durations_s[session - 1];
         match of_session().next() {
@@ -127,6 +154,21 @@ fn held_since_s(samples: &[Sample], jump_s: f64) -> Option<f64> {
     let missing = |s: &Sample| s.x_m.is_none() && s.y_m.is_none();
     let held = before.take_while(|s| missing(s) || (s.x_m, s.y_m) == (last.x_m, last.y_m));
     Some(held.last().unwrap_or(last).t_s)
+}
+
+/// Returns when the ball that stands at `certain_s` has moved on, s; the end if it never does.
+fn moves_on_s(samples: &[Sample], certain_s: f64) -> f64 {
+    let position = |s: &Sample| [s.x_m, s.y_m];
+    let is_seen = |s: &&Sample| position(s) != [None, None];
+    let mut after = samples.iter().skip_while(|s| s.t_s < certain_s).filter(is_seen);
+    let Some(there) = after.next() else { return certain_s };
+    let has_moved = |s: &&Sample| {
+        let both = position(s).into_iter().zip(position(there));
+        let mut moved = both.filter_map(|(to, from)| Some((to? - from?).abs()));
+        moved.any(|moved_m| moved_m > MOVING_M)
+    };
+    let end = samples.last().unwrap_or(there);
+    after.find(has_moved).unwrap_or(end).t_s
 }
 
 /// Time without a sample of `samples` that is a gap to the engine, s.
@@ -228,6 +270,44 @@ mod tests {
             words.starts_with("session 3: ") && words.contains("contradict the rest"),
             "{words}"
         );
+    }
+
+    /// Returns what is learnt if a hand holds the ball of the third session for 3 s from each of
+    /// `starts` on, s, while its controller tilts the plate; the ball rolls on from there.
+    fn held_by_a_hand(starts: &'static [f64]) -> Result<Calibration, CannotCalibrate> {
+        let healthy = session(60.0, 0.03, 0.84);
+        let index = |t_s: f64| (t_s / 0.01).round() as usize;
+        let moved = |of: fn(&Sample) -> Option<f64>, t_s: f64| {
+            let at = |t_s: f64| of(&healthy[index(t_s)]).unwrap();
+            let lost = starts.iter().filter(|from| t_s > **from);
+            let rolled =
+                at(t_s) - lost.map(|from| at(t_s.min(from + 3.0)) - at(*from)).sum::<f64>();
+            // The readings of a ball at rest differ in their last digit.
+            rolled + 1e-4 * (index(t_s) / 3 % 2) as f64
+        };
+        learnt(|_, s| {
+            s.x_m = Some(moved(|s| s.x_m, s.t_s));
+            s.y_m = Some(moved(|s| s.y_m, s.t_s));
+            if starts.iter().any(|from| (*from..from + 3.0).contains(&s.t_s)) {
+                (s.cmd_qx_rad, s.cmd_qy_rad) = (Some(0.1), Some(0.1));
+            }
+        })
+    }
+
+    #[test]
+    fn the_time_for_which_a_hand_holds_the_ball_is_left_out() {
+        let found = held_by_a_hand(&[AT_S]).unwrap();
+        let [moment] = found.left_out[..] else { panic!("{:?}", found.left_out) };
+        assert_eq!((moment.session, moment.reason), (3, Contradiction::Stood));
+        assert!((moment.from_s - AT_S).abs() < 0.5, "{moment:?}");
+        assert!((moment.to_s - AT_S - 3.0).abs() < 0.5, "{moment:?}");
+        assert_alike(&found, &learnt(|_, _| {}).unwrap());
+    }
+
+    #[test]
+    fn a_ball_that_stands_again_and_again_is_refused_since_it_sticks() {
+        let error = held_by_a_hand(&[15.0, 30.0, 45.0]).unwrap_err();
+        assert!(matches!(error, CannotCalibrate::Sticks { session: 3, .. }), "{error}");
     }
 
     /// For the first second a hand holds the ball.

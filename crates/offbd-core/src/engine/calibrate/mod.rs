@@ -105,6 +105,11 @@ pub enum CannotCalibrate {
     )]
     Contradictory { session: usize, percent: f64, n: usize, first: LeftOut },
     #[error(
+        "session {session}: the ball stood {n} times where the plate would have moved it, the first \
+         time at {from_s:.2} s: it sticks; clean ball and plate, or leave this session out"
+    )]
+    Sticks { session: usize, n: usize, from_s: f64 },
+    #[error(
         "judged by what the other data taught, session {session} would report {code} at {at_s:.2} s{of_kind}; \
          leave it out if the rig was not healthy then, or record more sessions",
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))

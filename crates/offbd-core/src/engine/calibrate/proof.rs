@@ -1,13 +1,14 @@
 //! Cross-validation of a calibration: each session is judged, with shorter times than
 //! later, by what was learnt from the others. Where that alarms, the rig varies more than
 //! the others showed: the limit concerned is widened until there is no alarm, or the
-//! calibration is refused. A moment in which the readings jump is left out instead.
+//! calibration is refused. A moment in which the readings jump, or the ball stands where no
+//! friction holds it, is left out instead.
 
 use super::data::Data;
-use super::self_test::{SelfTest, judge};
-use super::widening::Widening;
+use super::self_test::{Accusation, SelfTest, judge};
+use super::widening::{STOOD_S, Widening};
 use super::{CannotCalibrate, GoOn, certificate, check, learn_untested};
-use crate::diagnosis::{AxisCalibration, Calibration, Settings};
+use crate::diagnosis::{AxisCalibration, Calibration, LeftOut, Settings};
 use crate::engine::{Rig, Setup};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -64,7 +65,11 @@ pub(super) fn prove(
             return Ok(Some(with_most(widening.of(&learnt), &tests)));
         }
         if widening.is_beyond(&learnt) {
-            break;
+            // No friction holds a ball so firmly.
+            if !leave_out_stops(data, &mut folds, &tests)? {
+                break;
+            }
+            (contradicted, widening) = (true, Widening::default());
         }
     }
     if contradicted { Ok(None) } else { Err(accusation(&tests)) }
@@ -81,14 +86,37 @@ fn leave_out_jumps(
     for test in tests {
         let jumped = test.alarm.and_then(|alarm| Some((alarm.jump_s?, alarm.at_s)));
         let Some((jump_s, at_s)) = jumped else { continue };
-        let Some(moment) = data.leave_out_jump(test.session, jump_s, at_s)? else { continue };
-        any = true;
-        let of_session = |(session, _): &&mut (usize, Vec<Sample>)| *session == test.session;
-        for (_, samples) in folds.iter_mut().flat_map(|f| &mut f.judged).filter(of_session) {
-            samples.retain(|s| !moment.contains(s.t_s));
-        }
+        let left_out = data.leave_out_jump(test.session, jump_s, at_s)?;
+        any |= left_out.map(|moment| forget(folds, &moment)).is_some();
     }
     Ok(any)
+}
+
+/// Leaves out the moments in which `tests` found that the ball stands, of `data` and of `folds`.
+/// Returns whether there was any.
+fn leave_out_stops(
+    data: &mut Data,
+    folds: &mut [Fold],
+    tests: &[SelfTest],
+) -> Result<bool, CannotCalibrate> {
+    let mut any = false;
+    for test in tests {
+        let stood =
+            |alarm: &Accusation| alarm.code == FaultCode::StuckBall && alarm.still_s >= STOOD_S;
+        let Some(alarm) = test.alarm.filter(stood) else { continue };
+        let since_s = alarm.at_s - alarm.still_s;
+        let left_out = data.leave_out_stop(test.session, since_s, alarm.at_s)?;
+        any |= left_out.map(|moment| forget(folds, &moment)).is_some();
+    }
+    Ok(any)
+}
+
+/// Removes a moment from the sessions that are judged.
+fn forget(folds: &mut [Fold], moment: &LeftOut) {
+    let of_session = |(session, _): &&mut (usize, Vec<Sample>)| *session == moment.session;
+    for (_, samples) in folds.iter_mut().flat_map(|f| &mut f.judged).filter(of_session) {
+        samples.retain(|s| !moment.contains(s.t_s));
+    }
 }
 
 /// Returns `learnt` with the largest values seen in the tests, and its certificate.

@@ -21,7 +21,7 @@ const LEAST_WIDENED_REPEAT_S: f64 = 0.1;
 /// step of widening below what the evaluator takes for noise.
 const LASTING_DEVIATIONS: f64 = 2.8;
 /// Time of stillness below which a ball called stuck was only held back, s. Chosen.
-const STOOD_S: f64 = 0.2;
+pub(super) const STOOD_S: f64 = 0.2;
 
 /// The factors of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
