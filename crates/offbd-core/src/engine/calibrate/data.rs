@@ -45,6 +45,11 @@ impl Data {
         Self { sessions, left_out: Vec::new(), durations_s }
     }
 
+    /// How long the sessions last together, s.
+    pub(super) fn duration_s(&self) -> f64 {
+        self.durations_s.iter().sum()
+    }
+
     /// Leaves out the moment around a jump of the readings at `jump_s` that is certain at
     /// `certain_s` in session number `session`. Returns what is left out there;
     /// `None` if no sample is in it.

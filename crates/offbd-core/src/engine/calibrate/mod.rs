@@ -42,6 +42,9 @@ use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 /// Lengths of a window, s, the preferred first: a ball that sticks every other second
 /// offers only short stretches of motion. Chosen.
 pub(super) const WINDOWS_S: [f64; 2] = [1.2, 0.6];
+/// Least time that all sessions last together, s. Chosen: half of the minute that a rig is asked for.
+/// From less it cannot be told how the rig varies, and its healthy variation would count as faults.
+const LEAST_S: f64 = 30.0;
 /// Least number of windows with a moving ball. Chosen.
 const LEAST_WINDOWS: usize = 6;
 /// Largest relative standard error of the gain. Chosen.
@@ -67,6 +70,12 @@ pub enum CannotCalibrate {
     Implausible { session: usize, misfit: Misfit },
     #[error("no axis has both commands and positions: nothing to learn from")]
     NoAxis,
+    #[error(
+        "the recordings last {seconds:.0} s together, and at least {LEAST_S:.0} s are needed: add \
+         {more:.0} s or more with the ball rolling, also in further recordings",
+        more = LEAST_S - seconds
+    )]
+    TooBrief { seconds: f64 },
     #[error(
         "{axis}: only {n_windows} stretches of motion of {length} s are usable, {LEAST_WINDOWS} are needed; \
          record at least a minute with the ball rolling about the middle of the plate",
@@ -149,6 +158,11 @@ fn learn(
     check_fit(rig, sessions)?;
     let n_samples = sessions.iter().map(|s| s.len() as u64).sum();
     let mut data = Data::new(sessions);
+    // The last sample of a recording comes a period before its end.
+    let seconds = data.duration_s().round();
+    if seconds < LEAST_S {
+        return Err(CannotCalibrate::TooBrief { seconds });
+    }
     // Ends, since each round but the last leaves out more.
     loop {
         let taught = learn_untested(rig, &data.sessions, go_on)
@@ -452,7 +466,12 @@ pub(in crate::engine) mod tests {
     fn refusals_say_what_is_missing() {
         let rig = Rig::chapter("a");
         let refused = |s: Vec<Sample>| calibrate(&rig, &[s]).unwrap_err();
-        assert!(matches!(refused(session(4.0, 0.03, 1.0)), CannotCalibrate::TooShort { .. }));
+        assert_eq!(refused(session(20.0, 0.03, 1.0)), CannotCalibrate::TooBrief { seconds: 20.0 });
+        let mut mostly_blind = session(40.0, 0.03, 1.0);
+        for s in &mut mostly_blind[500..] {
+            (s.x_m, s.y_m) = (None, None);
+        }
+        assert!(matches!(refused(mostly_blind), CannotCalibrate::TooShort { .. }));
         assert!(matches!(refused(session(60.0, 0.03, -1.0)), CannotCalibrate::Reversed { .. }));
         let mut blind = session(60.0, 0.03, 1.0);
         for s in &mut blind {
