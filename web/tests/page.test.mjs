@@ -105,7 +105,7 @@ const VIEWS = () => [
   ["/set-up", "Units that the device sends"],
   ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"],
   ["/rigs/bench/set-up?step=check", "Signs and units"],
-  ["/rigs/bench/set-up?step=learn", "What was learnt"],
+  ["/rigs/bench/set-up?step=learn", "Detection times"],
   ["/learn", "Why 0.01"],
   ["/nowhere", "Page not found"],
 ];

@@ -6,7 +6,7 @@ const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   recorded: { symbol: "△", word: "on record" },
   drift: { symbol: "◇", word: "drifting" },
   untested: { symbol: "◌", word: "not tested" },
-  unlearnt: { symbol: "◌", word: "not learnt" },
+  unlearnt: { symbol: "◌", word: "not calibrated" },
   ok: { symbol: "●", word: "no fault" },
   silent: { symbol: "○", word: "silent" },
   unknown: { symbol: "○", word: "not known" },

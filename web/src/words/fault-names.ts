@@ -27,7 +27,7 @@ const KIND: Record<FaultKind, KindWords> = {
   intermittent: { meaning: "fails intermittently, as with a loose contact" },
   frozen: { meaning: "repeats its last reading" },
   dropout: { meaning: "gives no readings" },
-  noise: { meaning: "is much noisier than learnt", injected: "much noisier readings" },
+  noise: { meaning: "is much noisier than at its calibration", injected: "much noisier readings" },
   spikes: { meaning: "gives single readings that are far off", injected: "single readings that are far off" },
   jump: {
     meaning: "readings are shifted by a constant offset",

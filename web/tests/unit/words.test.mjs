@@ -25,7 +25,7 @@ test("a job that waits tells for what, another one what it does", () => {
   assert.equal(jobText({ waits: { reason: "jobs", n_before: 0 } }, "Judging"), "Judging…");
   assert.equal(jobText({ waits: { reason: "jobs", n_before: 1 } }, "Judging"), "Waiting for 1 other job…");
   const samples = { reason: "samples", n_before: 0 };
-  assert.equal(jobText({ waits: samples }, "Learning"), "Waiting until fewer samples are queued…");
+  assert.equal(jobText({ waits: samples }, "Calibrating"), "Waiting until fewer samples are queued…");
 });
 
 test("severity decreases from failing over acknowledged and pending to on record", () => {

@@ -59,7 +59,7 @@ function settingsFacts({ asset, last_occurrence }: FaultEntry, isPrinted: boolea
       calibration_id ? (
         <Link to={calibrationsPath(asset)}>a calibration of this rig</Link>
       ) : (
-        "no calibration: the rig was not learnt"
+        "none: the rig was not calibrated"
       ),
     ],
     [

@@ -11,7 +11,7 @@ const FILTERS: { key: HealthFilter; word: string }[] = [
   { key: "recorded", word: "On record" },
   { key: "drift", word: "Drifting" },
   { key: "untested", word: "Not tested" },
-  { key: "unlearnt", word: "Not learnt" },
+  { key: "unlearnt", word: "Not calibrated" },
   { key: "ok", word: "No fault" },
   { key: "silent", word: "Silent" },
   { key: "idle", word: "No session" },

@@ -11,7 +11,7 @@ export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[]
       <table class="numbers">
         <thead>
           <tr>
-            <th scope="col">Tested on recordings not learnt from</th>
+            <th scope="col">Tested on held-out recordings</th>
             <th scope="col" class="n">
               Judged
             </th>

@@ -65,7 +65,7 @@ const GAINS: Population =
 pub enum CannotCalibrate {
     #[error("session {session}: {misfit}")]
     Implausible { session: usize, misfit: Misfit },
-    #[error("no axis has both commands and positions: nothing to learn from")]
+    #[error("no axis has both commands and positions: nothing to calibrate from")]
     NoAxis,
     #[error(
         "{axis}: only {n_windows} stretches of motion of {length} s are usable, {LEAST_WINDOWS} are needed; \
@@ -87,13 +87,13 @@ pub enum CannotCalibrate {
     Reversed { axis: Axis, gain: f64 },
     #[error(
         "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, and neither the \
-         other axis nor the opposite sign clearly does: it is noise, drag, stiction or somebody's hand; \
+         other axis nor the opposite sign clearly does: it is noise, drag, stiction or a push by hand; \
          check the sensor, and that the recording is healthy",
         axis = axis.as_str(), command = axis.command()
     )]
     Unexplained { axis: Axis, percent: f64 },
     #[error(
-        "there is too little data to test what was learnt: nothing can be learnt from {what} alone \
+        "there is too little data to test the calibration: none can be made from {what} alone \
          ({reason}); record twice as long, or several sessions"
     )]
     Untested { what: &'static str, reason: Box<CannotCalibrate> },
@@ -105,7 +105,7 @@ pub enum CannotCalibrate {
     )]
     Contradictory { session: usize, percent: f64, n: usize, first: LeftOut },
     #[error(
-        "judged by what the other data taught, session {session} would report {code} at {at_s:.2} s{of_kind}; \
+        "judged by a calibration from the other data, session {session} would report {code} at {at_s:.2} s{of_kind}; \
          leave it out if the rig was not healthy then, or record more sessions",
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
     )]
