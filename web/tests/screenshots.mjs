@@ -149,7 +149,7 @@ try {
   await shoot(of, "session", `${base}/sessions/${monday.id}?t=19`, heading("Judge again"), async (view) => {
     await view.getByRole("button", { name: "Play" }).waitFor();
     await view.getByRole("button", { name: "Judge again" }).click();
-    await view.getByText("Another verdict").waitFor();
+    await view.getByText("Different verdict").waitFor();
   });
   await shoot(of, "import", `${base}/sessions`, heading("Sessions"), async (view) => {
     await view.getByText("monday").first().waitFor();

@@ -26,7 +26,7 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
   // The evidence of the chosen monitor is drawn with the values at which it decides.
   await view.getByRole("img", { name: /Evidence against the x servo/ }).waitFor();
   await view.getByLabel("Monitor").selectOption({ label: "Position sensor" });
-  await view.getByRole("img", { name: /Fault detection counter, sensor/ }).waitFor();
+  await view.getByRole("img", { name: /Fault detection counter, position sensor/ }).waitFor();
   assert.equal(await view.getByRole("img", { name: /Evidence against/ }).count(), 0);
 
   await view.getByText("Histogram of the residual").click();

@@ -78,7 +78,7 @@ test("a wall screen shows a tile for each rig, the worst group first", async () 
     .first()
     .waitFor();
   assert.deepEqual(await view.locator(".wall-group h2").allTextContents(), ["hall-2", "spare", "hall-1"]);
-  await view.getByRole("button", { name: "Show as a list" }).click();
+  await view.getByRole("button", { name: "List view" }).click();
   await view.getByRole("list", { name: "Rigs" }).waitFor();
   assert.doesNotMatch(view.url(), /layout/);
   assert.deepEqual(view.errors, []);

@@ -8,7 +8,7 @@ const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   untested: { symbol: "◌", word: "not tested" },
   unlearnt: { symbol: "◌", word: "not calibrated" },
   ok: { symbol: "●", word: "no fault" },
-  silent: { symbol: "○", word: "silent" },
+  silent: { symbol: "○", word: "no data" },
   unknown: { symbol: "○", word: "not known" },
   idle: { symbol: "○", word: "no session" },
 };

@@ -61,7 +61,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           class={`chip ${isMuted ? "chip-muted" : "chip-failing"}`}
           title={`Last data: ${dateTime(entry.communication_lost_since)}`}
         >
-          <b>Communication lost</b> since {sinceText(entry.communication_lost_since)}
+          <b>No data</b> since {sinceText(entry.communication_lost_since)}
         </span>
       )}
       {entry.muted?.map((mute) => (
@@ -69,9 +69,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           class="chip chip-muted"
           title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
         >
-          {mute.code === COMMUNICATION
-            ? "lost communication muted"
-            : `${alarmCodeTitle(mute.code)} not tested`}
+          {mute.code === COMMUNICATION ? "“No data” muted" : `${alarmCodeTitle(mute.code)} not tested`}
         </span>
       ))}
       {entry.stale && (
