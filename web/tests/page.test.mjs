@@ -100,7 +100,7 @@ const VIEWS = () => [
   [`/sessions/${session.id}/report`, "Calibration and certificate"],
   ["/rigs/bench/faults/x_servo/report", "Calibration and certificate"],
   ["/alarms", "What to do"],
-  ["/notifications", "nobody is told of anything"],
+  ["/notifications", "no notifications are sent"],
   ["/administration", "Audit log"],
   ["/set-up", "Units that the device sends"],
   ["/rigs/bench/set-up?step=connect", "Waiting for the first sample"],

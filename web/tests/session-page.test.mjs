@@ -138,7 +138,7 @@ test("a remark on a moment is kept, listed and removed", async () => {
   await view.getByText("12.00 s", { exact: true }).waitFor();
   await view.getByLabel("Remark", { exact: true }).fill("new horn");
   await view.getByLabel("Your name, recorded with the action").fill("ada");
-  await view.getByRole("button", { name: "Keep for this moment" }).click();
+  await view.getByRole("button", { name: "Add remark at this moment" }).click();
   const list = view.getByRole("list", { name: "Remarks" });
   await list.getByText("new horn").waitFor();
   await list.getByText(/^ada, /).waitFor();
