@@ -16,7 +16,7 @@ export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[]
               Judged
             </th>
             <th scope="col" class="n">
-              Closest to an alarm
+              Closest to the limit
             </th>
             <th scope="col" class="n">
               False alarms
