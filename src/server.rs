@@ -476,10 +476,9 @@ impl fmt::Display for ConfigSummary {
             LogFormat::Text => "text",
             LogFormat::Json => "json",
         };
-        let threads = if self.shards == 1 { "thread" } else { "threads" };
         writeln!(f, "listen   {}\naccess   {access}, {encrypted}", self.listen)?;
         writeln!(f, "store    {}\nlog      as {format}, level {}", self.store, self.log_level)?;
-        write!(f, "engines  on {} {threads}", self.shards)
+        write!(f, "workers  {}", self.shards)
     }
 }
 

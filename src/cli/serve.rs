@@ -180,7 +180,7 @@ fn print_check(result: &CheckResult, is_asked: bool) -> anyhow::Result<()> {
     };
     store.findings.iter().try_for_each(|finding| output::print_line(finding))?;
     match store.page_checksums {
-        Some(true) => output::print_line("pages    each has a checksum, and all were read")?,
+        Some(true) => output::print_line("pages    all read, their checksums match")?,
         Some(false) => output::print_line(
             "pages    without checksums: an earlier version has made this file; to add them, \
              stop the service, `offbd backup` the store, and `offbd restore --replace` the copy",

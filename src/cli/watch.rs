@@ -113,7 +113,7 @@ impl Screen {
         let mut lines = self.heading(state.session.as_deref().unwrap_or("no session"));
         let learning = state.learning.as_ref().map(|learning| learning.summary.clone());
         if self.learning != learning {
-            let summary = learning.iter().map(|summary| table::wrapped("  learning: ", summary));
+            let summary = learning.iter().map(|summary| table::wrapped("  calibration: ", summary));
             lines.extend(summary);
             self.learning = learning;
         }
@@ -199,7 +199,7 @@ fn block(state: &StateView) -> Vec<String> {
 /// The progress of learning, as separate lines of the screen, because lines to erase are
 /// counted.
 fn learning(learning: &LearningView) -> Vec<String> {
-    let words = table::wrapped("           learning: ", &learning.summary);
+    let words = table::wrapped("           calibration: ", &learning.summary);
     words.lines().map(str::to_owned).collect()
 }
 
@@ -271,9 +271,9 @@ mod tests {
         let state = gathering(words);
         let mut screen = Screen::default();
         let plain = screen.plain(&state);
-        assert!(plain.contains(&format!("  learning: {words}")), "{plain:?}");
+        assert!(plain.contains(&format!("  calibration: {words}")), "{plain:?}");
         assert_eq!(screen.plain(&state).len(), 1, "nothing has changed");
-        assert_eq!(block(&state).last().unwrap().trim(), format!("learning: {words}"));
+        assert_eq!(block(&state).last().unwrap().trim(), format!("calibration: {words}"));
         let long = block(&gathering(&"record steps or circles, ".repeat(9)));
         assert!(long.iter().all(|line| !line.contains('\n')), "each line is counted");
         let learnt = StateView { learning: None, ..state };

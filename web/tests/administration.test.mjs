@@ -53,11 +53,11 @@ test("a token is created, shown once, used, and revoked after a question", async
   await view.getByRole("button", { name: "I have copied it" }).click();
   const row = view.getByRole("row", { name: /^camera of bench-1/ });
   await row.getByText("device of bench-1").waitFor();
-  await row.getByText(/in force until .*2090/).waitFor();
+  await row.getByText(/valid until .*2090/).waitFor();
   assert.ok(!(await view.textContent("body")).includes(secret));
 
   await row.getByRole("button", { name: "Revoke camera of bench-1" }).click();
-  await view.getByText("Whoever uses it is refused at once").waitFor();
+  await view.getByText("Its holder is logged out and refused at once").waitFor();
   assert.equal((await send("bench-1")).status, 200, "nothing is done before the answer");
   await view.getByRole("dialog").getByRole("button", { name: "Revoke" }).click();
   await row.waitFor({ state: "detached" });

@@ -43,7 +43,7 @@ test("alarms from before the page was opened are listed and acknowledged togethe
     const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
     assert.equal(fault.acknowledged, true, rig);
   }
-  await view.getByRole("checkbox", { name: "Nobody has acknowledged", exact: true }).check();
+  await view.getByRole("checkbox", { name: "Unacknowledged only", exact: true }).check();
   await view
     .getByRole("link", { name: /X servo/ })
     .first()
@@ -57,10 +57,10 @@ test("what to do is told, and the owner's note is kept", async () => {
   const row = view.getByRole("row", { name: /bench X servo/ });
   await row.getByText("What to do").click();
   await row.getByText("power").first().waitFor();
-  await row.getByRole("button", { name: "Add a note" }).click();
-  await row.getByRole("textbox", { name: "Note on every fault" }).fill("Spare horns are in the drawer.");
+  await row.getByRole("button", { name: "Add a remark" }).click();
+  await row.getByRole("textbox", { name: "Remark on every fault" }).fill("Spare horns are in the drawer.");
   await row.getByLabel(ACTOR).fill("ada");
-  await row.getByRole("button", { name: "Keep" }).click();
+  await row.getByRole("button", { name: "Save" }).click();
   await row.getByText("Spare horns are in the drawer.").waitFor();
   const { notes } = await ask(service.url, "GET", "/advice");
   assert.deepEqual(
@@ -75,14 +75,14 @@ test("what to do is told, and the owner's note is kept", async () => {
     await view.getByText("Spare horns are in the drawer.").waitFor();
   }
   await view.emulateMedia({ media: "print" });
-  assert.equal(await view.getByRole("button", { name: "Edit the note" }).isVisible(), false);
+  assert.equal(await view.getByRole("button", { name: "Edit the remark" }).isVisible(), false);
   await view.done();
 });
 
 test("a channel and a rule are made in the page, and a test message arrives", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/notifications`);
-  await view.getByText("nobody is told of anything").waitFor();
+  await view.getByText("no notifications are sent").waitFor();
   await view.getByRole("button", { name: "Add a channel" }).click();
   await view.getByLabel("Name").fill("workshop");
   await view.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/hook`);
@@ -96,8 +96,8 @@ test("a channel and a rule are made in the page, and a test message arrives", as
   assert.ok(Math.abs(y + height / 2 - 400) < 100, `the dialog is in the middle: ${y}, ${height}`);
   await view.getByLabel("Name").fill("everything");
   await view.getByRole("button", { name: "Add", exact: true }).click();
-  await view.getByRole("button", { name: "Silence 8 h" }).click();
-  await view.getByText("silent until").waitFor();
+  await view.getByRole("button", { name: "Mute 8 h" }).click();
+  await view.getByText("muted until").waitFor();
   const [rule] = (await ask(service.url, "GET", "/notifications/rules")).items;
   assert.deepEqual([rule.name, rule.asset, rule.channel_name], ["everything", "*", "workshop"]);
   assert.ok(Date.parse(rule.silent_until) > Date.now());

@@ -21,20 +21,20 @@ test("the calibrations are listed with their fit, and an earlier one is used aga
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("link", { name: "Calibrations" }).click();
-  await view.getByRole("heading", { name: `What calibration ${n} learnt` }).waitFor();
+  await view.getByRole("heading", { name: `Values of calibration ${n}` }).waitFor();
   await view.getByRole("heading", { name: `Before: with calibration ${n - 1}` }).waitFor();
 
   await view.getByRole("radio", { name: "1" }).check();
-  await view.getByRole("heading", { name: "What calibration 1 learnt" }).waitFor();
+  await view.getByRole("heading", { name: "Values of calibration 1" }).waitFor();
   await view.getByRole("heading", { name: "Before: without a calibration" }).waitFor();
   await view.getByText(/^Along x the residual is [\d.]+\sm\/s²/).waitFor();
   assert.equal(await view.getByRole("img", { name: /^Residual along/ }).count(), 4);
   assert.equal(await view.getByRole("img", { name: /^Acceleration along/ }).count(), 4);
 
   const first = view.getByRole("row", { name: /^1 / });
-  await first.getByRole("button", { name: "Use this one again" }).click();
-  const dialog = view.getByRole("dialog", { name: "Use calibration 1 again?" });
-  await dialog.getByRole("button", { name: "Use this one again" }).click();
+  await first.getByRole("button", { name: "Restore this calibration" }).click();
+  const dialog = view.getByRole("dialog", { name: "Restore calibration 1?" });
+  await dialog.getByRole("button", { name: "Restore this calibration" }).click();
   await view.getByRole("row", { name: /^1 .* in use since/ }).waitFor();
   const { items } = await ask(service.url, "GET", "/assets/bench/calibrations");
   assert.deepEqual(

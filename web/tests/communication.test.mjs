@@ -35,21 +35,21 @@ test("lost communication is told since when and by whom it is acknowledged, and 
   await send();
 
   const feed = fleet.getByRole("region", { name: "Events" });
-  await feed.getByText("No data arrive although a session is open").waitFor();
-  await feed.getByRole("link", { name: /bench: Communication lost/ }).waitFor();
+  await feed.getByText(/^No data since .*, though a session is open\.$/).waitFor();
+  await feed.getByRole("link", { name: /bench: Data stopped/ }).waitFor();
   const row = fleet.getByRole("list", { name: "Rigs" });
-  await row.getByText(/Communication lost since \d/).waitFor();
+  await row.getByText(/No data since \d/).waitFor();
 
   // A page that is opened now has no reason of its own to call the rig silent.
   const late = await page(chromium);
   await late.goto(`${service.url}/rigs/bench`);
-  await late.getByText(/Communication lost since \d/).waitFor();
+  await late.getByText(/No data since \d/).waitFor();
   // Not known until the rig's faults are there.
-  await late.locator("h1 .health", { hasText: /^○silent$/ }).waitFor();
+  await late.locator("h1 .health", { hasText: /^○no data$/ }).waitFor();
   await late.done();
 
-  const alarm = rig.getByRole("alert").filter({ hasText: "Communication lost" });
-  await alarm.getByText(/Communication lost since \d/).waitFor();
+  const alarm = rig.getByRole("alert").filter({ hasText: "No data since" });
+  await alarm.getByText(/No data since \d/).waitFor();
   await alarm.getByLabel("Your name, recorded with the action").fill("ada");
   await alarm.getByRole("button", { name: "Acknowledge" }).click();
   await alarm.getByText(/Acknowledged by ada, /).waitFor();
@@ -61,7 +61,7 @@ test("lost communication is told since when and by whom it is acknowledged, and 
     return (await feed.getByText("Data arrive again.").count()) > 0;
   });
   await alarm.waitFor({ state: "detached" });
-  await row.getByText("Communication lost").waitFor({ state: "detached" });
+  await row.getByText(/No data since/).waitFor({ state: "detached" });
   assert.equal(await feed.getByRole("listitem").count(), 2, "each change once");
   assert.deepEqual([...fleet.errors, ...rig.errors], []);
   await rig.done();
@@ -111,10 +111,10 @@ test("lost communication is muted with a reason and for a time, before it is los
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/moved`);
   const card = view.getByRole("region", { name: "Link" });
-  await card.getByText("An alarm is raised if data stay away").waitFor();
-  await card.getByRole("button", { name: "Mute Communication lost" }).click();
-  const dialog = view.getByRole("dialog", { name: "Mute Communication lost of moved" });
-  await dialog.getByText(/Nobody is told if data stay away/).waitFor();
+  await card.getByText("Alarms if data stop during a session").waitFor();
+  await card.getByRole("button", { name: "Mute No data" }).click();
+  const dialog = view.getByRole("dialog", { name: "Mute No data of moved" });
+  await dialog.getByText(/No notification is sent if data stop/).waitFor();
   assert.ok(await dialog.getByRole("button", { name: "Mute" }).isDisabled(), "without a reason");
   await dialog.getByLabel("Why").fill("the rig moves to hall 2");
   await dialog.getByLabel("For").selectOption({ label: "a day" });
@@ -127,18 +127,18 @@ test("lost communication is muted with a reason and for a time, before it is los
   assert.equal(Math.round(hours), 24);
 
   await ask(service.url, "POST", "/assets/moved/telemetry", { samples: [{ t_s: 0, x_m: 0, y_m: 0 }] });
-  const alarm = view.getByRole("alert").filter({ hasText: "Communication lost" });
+  const alarm = view.getByRole("alert").filter({ hasText: "No data since" });
   await alarm.getByText(/Muted by ada until .*: the rig moves to hall 2/).waitFor();
   const fleet = await page(chromium, { viewport: { width: 1500, height: 900 } });
   await fleet.goto(service.url);
   const row = fleet.getByRole("link", { name: /moved/ });
-  await row.getByText("lost communication muted").waitFor();
-  assert.match(await row.getByText(/Communication lost since/).getAttribute("class"), /chip-muted/);
+  await row.getByText("“No data” muted").waitFor();
+  assert.match(await row.getByText(/No data since/).getAttribute("class"), /chip-muted/);
 
-  await alarm.getByRole("button", { name: /^End the mute of Communication lost/ }).click();
-  await alarm.getByRole("button", { name: "Mute Communication lost" }).waitFor();
-  await card.getByText("An alarm is raised if data stay away").waitFor();
-  await row.getByText("lost communication muted").waitFor({ state: "detached" });
+  await alarm.getByRole("button", { name: /^End the mute of No data/ }).click();
+  await alarm.getByRole("button", { name: "Mute No data" }).waitFor();
+  await card.getByText("Alarms if data stop during a session").waitFor();
+  await row.getByText("“No data” muted").waitFor({ state: "detached" });
   assert.deepEqual([...view.errors, ...fleet.errors], []);
   await fleet.done();
   await view.done();

@@ -26,7 +26,7 @@ test("two sessions of the list are compared on one time axis", async () => {
   await view.getByRole("heading", { name: "sick" }).waitFor();
   assert.equal(await view.getByRole("heading", { name: "Verdict" }).count(), 2);
   assert.equal(await view.getByRole("img", { name: /^Residual along x/ }).count(), 2);
-  await view.getByLabel("The second begins later by").fill("2.5");
+  await view.getByLabel("Shift second session by").fill("2.5");
   await view.waitForURL(/shift=2\.5/);
   await view.getByLabel("Axis").selectOption("y");
   assert.equal(await view.getByRole("img", { name: /^Residual along y/ }).count(), 2);

@@ -56,8 +56,8 @@ test("a fault is shown after its event, on the pages of the fleet and the rig", 
   assert.equal(line.asset, "demo-rig");
   // The banner says what is wrong and since when.
   const banner = rig.getByRole("list", { name: "Active faults" }).getByRole("link", { name: /Y servo/ });
-  await banner.getByText("no power: the plate returns to zero").waitFor();
-  await banner.getByText(/failing now since \d/).waitFor();
+  await banner.getByText("does not respond: the plate returns to zero").waitFor();
+  await banner.getByText(/failing since \d/).waitFor();
   await rig.getByText("failed", { exact: true }).waitFor();
   for (const view of [fleet, rig, buttons]) {
     assert.deepEqual(view.errors, []);
@@ -91,7 +91,7 @@ test("a fault is shown after its event, on the pages of the fleet and the rig", 
   const headline = await rig.locator(".sentence").textContent();
   await rig.getByText("Its test passes again since").waitFor({ timeout: 3 * SOON });
   assert.equal(await rig.locator(".sentence").textContent(), headline);
-  await rig.getByText("on record, passes again, acknowledged").waitFor();
+  await rig.getByText("was confirmed, passes again, acknowledged").waitFor();
   await rig.getByText("passes its test again").first().waitFor();
   await rig.getByRole("button", { name: "Clear" }).click();
   await rig.getByRole("dialog").getByRole("button", { name: "Cancel" }).click();

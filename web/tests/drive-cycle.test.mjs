@@ -66,7 +66,7 @@ test("a rig that is not learnt has no drive cycle, and the page says why", async
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/new`);
   const card = view.locator("#drive-cycle");
-  await card.getByText("before the rig has been learnt").waitFor();
+  await card.getByText("before the rig is calibrated").waitFor();
   assert.equal(await card.getByRole("button").count(), 0);
   await view.done();
 });

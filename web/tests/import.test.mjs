@@ -103,7 +103,7 @@ test("a recording as its owner has it is read by its guesses, once they are conf
   await correct.waitFor({ state: "detached" });
   assert.equal(await chosen("Unit of Ball y"), "cm");
   await dialogue.getByLabel("Rig").fill("bench");
-  await dialogue.getByLabel("Keep this mapping for further files").check();
+  await dialogue.getByLabel("Save this mapping for further files").check();
   await dialogue.getByRole("button", { name: /^Import [\d\s]+ rows/ }).click();
   await view.getByRole("heading", { name: "lab", exact: true }).waitFor();
   const { columns } = await ask(service.url, "GET", "/assets/bench");

@@ -18,7 +18,7 @@ function send(asset, from, to) {
   return ask(service.url, "POST", `/assets/${asset}/telemetry?session=first`, body, "text/csv");
 }
 
-const panel = (view) => view.getByRole("region", { name: "Learning" });
+const panel = (view) => view.getByRole("region", { name: "Calibration", exact: true });
 
 test("motion is gathered, a calibration offered and confirmed", async () => {
   await ask(service.url, "POST", "/assets", { name: "new" });
@@ -48,13 +48,13 @@ test("motion is gathered, a calibration offered and confirmed", async () => {
   await step.getByText(/A calibration is ready/).waitFor();
   await step.done();
   const drift = view.locator("#drift");
-  await drift.getByText("no trends before the rig has been learnt").waitFor();
-  await panel(view).getByRole("button", { name: "Yes, use what was learnt" }).click();
-  await view.getByRole("heading", { name: "Learnt automatically" }).waitFor();
+  await drift.getByText("no trends before the rig is calibrated").waitFor();
+  await panel(view).getByRole("button", { name: "Yes, use this calibration" }).click();
+  await view.getByRole("heading", { name: "Calibrated automatically" }).waitFor();
   await panel(view)
-    .getByText(/Learnt from 1 session; further healthy sessions refine it until it is based on 5/)
+    .getByText(/Calibrated from 1 session; further healthy sessions refine it until it is based on 5/)
     .waitFor();
-  await drift.getByText("0 of 7 required sessions").waitFor();
+  await drift.getByText("0 of 7 sessions so far").waitFor();
   const { calibration } = await ask(service.url, "GET", "/assets/new");
   assert.ok(
     Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,
@@ -69,9 +69,9 @@ test("a rejected calibration starts again", async () => {
   await send("odd", 0, 7000);
   const view = await page(chromium);
   await view.goto(service.url);
-  await view.getByRole("link", { name: /odd.*was it healthy\?/ }).click();
+  await view.getByRole("link", { name: /odd.*confirm calibration/ }).click();
   await panel(view).getByRole("button", { name: "No, start again" }).click();
-  await view.getByRole("heading", { name: "This rig has not been learnt yet" }).waitFor();
+  await view.getByRole("heading", { name: "This rig is not calibrated yet" }).waitFor();
   const learning = await ask(service.url, "GET", "/assets/odd/learning");
   assert.deepEqual([learning.state, learning.sessions], ["gathering", []]);
   assert.deepEqual(view.errors, []);

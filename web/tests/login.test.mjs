@@ -46,7 +46,7 @@ test("without authentication, only the login is shown", async () => {
   assert.deepEqual(wrong, []);
   await view.getByLabel("Token").fill("offbd_wrong");
   await view.getByRole("button", { name: "Log in" }).click();
-  await view.getByText("the token is unknown, revoked or expired").waitFor();
+  await view.getByText("unknown, revoked or expired token").waitFor();
 });
 
 test("a token opens the requested page", async () => {
@@ -89,11 +89,12 @@ test("a token names the user, who is not asked for a name", async () => {
 
 /** The views with actions, each with the names of the buttons that a viewer may not press. */
 const REFUSED = (session) => [
-  ["/rigs/bench-1", ["End session", "Mute Y servo", /^End the mute of X servo/]],
+  ["/rigs/bench-1", ["Add tags", "End session", "Mute Y servo", /^End the mute of X servo/]],
   ["/rigs/bench-1/faults/sensor", ["Acknowledge", "Clear"]],
-  ["/alarms", ["Acknowledge", "Add a note"]],
+  ["/alarms", ["Acknowledge", "Add a remark"]],
   ["/rigs/bench-1/set-up?step=check", ["Positions are in mm", "Commands are in degrees"]],
-  [`/sessions/${session}`, ["Keep for this moment", "Judge again"]],
+  [`/sessions/${session}`, ["Add remark at this moment", "Judge again"]],
+  ["/sessions", ["choose a file"]],
   ["/learn", ["Repair all", "Resume the script", /^Inject: Y servo, dead/]],
 ];
 

@@ -119,11 +119,16 @@ try {
     view.getByText("workshop").first().waitFor(),
   );
   await shoot(of, "administration", `${base}/administration`, heading("Audit log"));
-  await shoot(of, "calibrations", `${base}/rigs/taught/calibrations`, heading("What calibration"), (view) =>
-    view
-      .getByRole("img", { name: /^Residual along/ })
-      .first()
-      .waitFor(),
+  await shoot(
+    of,
+    "calibrations",
+    `${base}/rigs/taught/calibrations`,
+    heading("Values of calibration"),
+    (view) =>
+      view
+        .getByRole("img", { name: /^Residual along/ })
+        .first()
+        .waitFor(),
   );
   await shoot(
     of,
@@ -144,7 +149,7 @@ try {
   await shoot(of, "session", `${base}/sessions/${monday.id}?t=19`, heading("Judge again"), async (view) => {
     await view.getByRole("button", { name: "Play" }).waitFor();
     await view.getByRole("button", { name: "Judge again" }).click();
-    await view.getByText("Another verdict").waitFor();
+    await view.getByText("Different verdict").waitFor();
   });
   await shoot(of, "import", `${base}/sessions`, heading("Sessions"), async (view) => {
     await view.getByText("monday").first().waitFor();
@@ -156,7 +161,7 @@ try {
   await shoot(of, "check", `${base}/rigs/demo-rig/set-up?step=check`, heading("Signs and units"), (view) =>
     settle(view, 5000),
   );
-  await shoot(of, "learn-rig", `${base}/rigs/bench-1/set-up?step=learn`, heading("What was learnt"));
+  await shoot(of, "learn-rig", `${base}/rigs/bench-1/set-up?step=learn`, heading("Detection times"));
   await shoot(of, "demo", `${base}/learn`, heading("Inject faults"), (view) => settle(view));
   await shoot(of, "missing", `${base}/rigs/nobody`, heading("nobody"));
 } finally {

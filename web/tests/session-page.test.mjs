@@ -26,7 +26,7 @@ test("a link leads to the moment, speed and profile, and charts are zoomed and r
   // The evidence of the chosen monitor is drawn with the values at which it decides.
   await view.getByRole("img", { name: /Evidence against the x servo/ }).waitFor();
   await view.getByLabel("Monitor").selectOption({ label: "Position sensor" });
-  await view.getByRole("img", { name: /Fault detection counter, sensor/ }).waitFor();
+  await view.getByRole("img", { name: /Fault detection counter, position sensor/ }).waitFor();
   assert.equal(await view.getByRole("img", { name: /Evidence against/ }).count(), 0);
 
   await view.getByText("Histogram of the residual").click();
@@ -138,7 +138,7 @@ test("a remark on a moment is kept, listed and removed", async () => {
   await view.getByText("12.00 s", { exact: true }).waitFor();
   await view.getByLabel("Remark", { exact: true }).fill("new horn");
   await view.getByLabel("Your name, recorded with the action").fill("ada");
-  await view.getByRole("button", { name: "Keep for this moment" }).click();
+  await view.getByRole("button", { name: "Add remark at this moment" }).click();
   const list = view.getByRole("list", { name: "Remarks" });
   await list.getByText("new horn").waitFor();
   await list.getByText(/^ada, /).waitFor();

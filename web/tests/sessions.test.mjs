@@ -89,11 +89,11 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   await view.waitForFunction(() => Number(document.querySelector(".scrub").value) < 21);
 
   await view.getByRole("button", { name: "Judge again" }).click();
-  await view.getByText("Another verdict").waitFor();
+  await view.getByText("Different verdict").waitFor();
   await view.getByText("X servo, Y servo").waitFor();
   await view.getByLabel("Profile").selectOption("");
   await view.getByRole("button", { name: "Judge again" }).click();
-  await view.getByText("The same verdict, transition by transition.").waitFor();
+  await view.getByText("Identical verdict.").waitFor();
 
   await view.getByRole("button", { name: "Play" }).click();
   await view.getByRole("button", { name: /record/ }).click();

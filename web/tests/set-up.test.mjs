@@ -51,7 +51,7 @@ test("described, connected, corrected, learnt", async () => {
   await view.getByLabel("Debounce time").waitFor();
   assert.match(view.url(), /set-up$/, "a value out of range is shown, though it was hidden");
   await view.getByLabel("Debounce time").fill("0.5");
-  await view.getByLabel("Accepted false alarms").fill("12");
+  await view.getByLabel("Accepted false servo alarms").fill("12");
   await view.getByLabel("Ball's position").selectOption({ label: "mm" });
   assert.equal(await isValid(), true);
   await view.getByLabel("Mass").press("Enter");
@@ -83,7 +83,7 @@ test("described, connected, corrected, learnt", async () => {
   // The next session is complete, however long the detection took.
   at = 0;
   await device(async () => (await view.getByText("moves as commanded").count()) === 2);
-  await view.getByRole("button", { name: "Continue: learn the rig" }).click();
+  await view.getByRole("button", { name: "Continue: calibrate the rig" }).click();
 
   await device(() => false);
   await view.getByText("recording", { exact: false }).first().waitFor();
@@ -93,8 +93,8 @@ test("described, connected, corrected, learnt", async () => {
     if (!(await box.isChecked())) await box.click();
     return box.isChecked();
   });
-  await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
-  await view.getByText("The next session is judged by it.").waitFor();
+  await view.getByRole("button", { name: /^(Calibrate|End the recording and calibrate)$/ }).click();
+  await view.getByText("Used from the next session on.").waitFor();
   const learnt = await ask(service.url, "GET", "/assets/bench-1");
   assert.ok(
     Math.abs(learnt.calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,
@@ -127,7 +127,7 @@ test("a recording without motion is refused with a message", async () => {
   const view = await page(chromium);
   await view.goto(`${service.url}/rigs/still/set-up?step=learn`);
   await view.getByRole("checkbox").first().check();
-  await view.getByRole("button", { name: /Learn from it|End the recording and learn/ }).click();
+  await view.getByRole("button", { name: /^(Calibrate|End the recording and calibrate)$/ }).click();
   await view.getByRole("alert").waitFor();
   assert.ok((await view.getByRole("alert").textContent()).length > 20);
   assert.deepEqual(view.errors, []);

@@ -19,7 +19,7 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("button", { name: "Add tags" }).click();
   await view.getByRole("textbox", { name: "Tags, separated by blanks" }).fill("hall-2 spare");
-  await view.getByRole("button", { name: "Keep" }).click();
+  await view.getByRole("button", { name: "Save" }).click();
   await view.getByRole("link", { name: "hall-2" }).click();
   const rigs = view.getByRole("list", { name: "Rigs" });
   await rigs.getByRole("link", { name: /bench/ }).waitFor();
@@ -35,7 +35,7 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
     .first()
     .waitFor();
   await view.getByLabel("Tag").selectOption("hall-1");
-  await view.getByText("No alarm").waitFor();
+  await view.getByText("No alarm matches this filter").waitFor();
 
   await view.goto(`${service.url}/sessions?tag=hall-2`);
   await view.getByRole("link", { name: "monday" }).waitFor();
@@ -59,7 +59,7 @@ test("a view is saved, opened, renamed and deleted, and is there after a reload"
   await view.getByLabel("New name of first hall").fill("hall one");
   await view.getByRole("button", { name: "Rename" }).click();
   await view.getByRole("button", { name: "hall one", exact: true }).click();
-  await view.getByText("No alarm").waitFor();
+  await view.getByText("No alarm matches this filter").waitFor();
   assert.match(view.url(), /alarms\?.*tag=hall-1/);
   await view.getByRole("button", { name: "Views" }).click();
   await view.getByRole("button", { name: "Delete hall one" }).click();
@@ -78,7 +78,7 @@ test("a wall screen shows a tile for each rig, the worst group first", async () 
     .first()
     .waitFor();
   assert.deepEqual(await view.locator(".wall-group h2").allTextContents(), ["hall-2", "spare", "hall-1"]);
-  await view.getByRole("button", { name: "Show as a list" }).click();
+  await view.getByRole("button", { name: "List view" }).click();
   await view.getByRole("list", { name: "Rigs" }).waitFor();
   assert.doesNotMatch(view.url(), /layout/);
   assert.deepEqual(view.errors, []);

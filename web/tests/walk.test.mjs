@@ -58,7 +58,7 @@ test("from the demo to the explanation of a fault", async () => {
 
   await press("Play the session back", "link");
   await press("Judge again");
-  await view.getByText("Another verdict").waitFor();
+  await view.getByText("Different verdict").waitFor();
 
   await press("Lessons", "link");
   await press("Repair all");

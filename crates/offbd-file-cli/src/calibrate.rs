@@ -147,7 +147,7 @@ pub fn write_asset(rig: &Rig, path: &Path) -> anyhow::Result<()> {
 /// Prints the calibration on stderr.
 pub fn report(rig: &Rig, calibration: &Calibration) {
     output::remark(format_args!(
-        "{}: learnt from {} samples, {:.0} s",
+        "{}: calibrated from {} samples, {:.0} s",
         rig.name, calibration.n_samples, calibration.duration_s
     ));
     let heading = ["", "x", "y", "meaning"];
@@ -239,8 +239,8 @@ fn range(values: impl Iterator<Item = f64> + Clone) -> Option<f64> {
 
 /// Prints the false alarms to expect of each monitor on stderr.
 fn report_certificate(certificate: &[MonitorCertificate]) {
-    output::remark(format_args!("\non the healthy rig, by tests on recordings not learnt from"));
-    let heading = ["monitor", "judged", "nearest to an alarm", "false alarms to expect"];
+    output::remark(format_args!("\non the healthy rig, by tests on held-out recordings"));
+    let heading = ["monitor", "judged", "closest to the limit", "false alarms to expect"];
     let mut lines = table::table(&heading, &[1, 2, 3]);
     for (code, monitor) in FaultCode::ALL.iter().zip(certificate) {
         lines.add_row([
@@ -258,10 +258,11 @@ fn report_certificate(certificate: &[MonitorCertificate]) {
 /// A rate of alarms with a suitable unit.
 fn alarm_rate(per_hour: f64) -> String {
     let per_day = 24.0 * per_hour;
+    let days = (1.0 / per_day).round();
     match per_day {
         d if d >= 24.0 => format!("{per_hour:.1} an hour"),
-        d if d >= 1.0 => format!("{d:.1} a day"),
-        d => format!("one in {:.0} days", 1.0 / d),
+        d if days <= 1.0 => format!("{d:.1} a day"),
+        _ => format!("one in {days:.0} days"),
     }
 }
 
@@ -271,10 +272,10 @@ fn report_prospects(prospects: &Prospects) {
     let heading = ["", "x", "y", "meaning"];
     let mut servos = table::table(&heading, &[1, 2]);
     let numbers: [ServoTableRow; 5] = [
-        ("dead", |s| seconds(s.dead_s), "the servo answers nothing"),
-        ("half", |s| seconds(s.half_gain_s), "it answers half"),
+        ("dead", |s| seconds(s.dead_s), "no response"),
+        ("half", |s| seconds(s.half_gain_s), "half response"),
         ("off by 1°", |s| seconds(s.offset_1deg_s), "its horn has slipped"),
-        ("least loss", |s| percent(s.least_gain_loss), "of the answer that is found in 10 s"),
+        ("least loss", |s| percent(s.least_gain_loss), "of the response that is found in 10 s"),
         ("least slip", |s| degrees(s.least_offset_rad), "of the horn that is found in 10 s"),
     ];
     for (name, number, meaning) in numbers {

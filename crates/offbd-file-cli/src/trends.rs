@@ -106,7 +106,8 @@ fn write_table(
     writeln!(out)?;
     if view.trends.is_empty() {
         let needed = format!("{LEAST_SESSIONS} sessions with enough motion make a trend");
-        writeln!(out, "{needed}; there are fewer")?;
+        let n = view.points.iter().filter(|point| point.x.is_some() || point.y.is_some()).count();
+        writeln!(out, "{needed}; only {n} so far")?;
         return Ok(());
     }
     let heading = ["trend", "a session", "between", "and", "now", "limits"];

@@ -225,7 +225,7 @@ impl Guard {
             }
         };
         let Some(principal) = principal else {
-            let detail = "the token is unknown, revoked or expired";
+            let detail = "unknown, revoked or expired token";
             return Err(unauthenticated(detail, Some("invalid_token")));
         };
         if !is_forwarded {

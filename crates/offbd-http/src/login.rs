@@ -56,7 +56,7 @@ pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<R
     }
     let Some(principal) = app.service.authenticate(&Credential::token(login.token.trim())).await?
     else {
-        let detail = "the token is unknown, revoked or expired";
+        let detail = "unknown, revoked or expired token";
         let title = "Unauthorized";
         return Err(Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", title, detail));
     };

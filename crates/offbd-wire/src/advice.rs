@@ -44,7 +44,7 @@ pub fn checks(code: AlarmCodeWord, kind: Option<KindWord>) -> &'static [&'static
     }
     match code {
         AlarmCodeWord::XServo | AlarmCodeWord::YServo => &[
-            "Has the servo power, and is its cable plugged in?",
+            "Does the servo have power, and is its cable plugged in?",
             "Is the horn screw tight, and does the linkage move freely?",
             "Run the drive cycle: it tells which kind of fault it is.",
         ],

@@ -28,7 +28,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
             Some(format!("the servo does not answer {}{}", axis.command(), known(answer)))
         }),
         checks: &[
-            "Has the servo power? Measure the supply at its plug.",
+            "Does the servo have power? Measure the supply at its plug.",
             "Is the signal cable plugged in, and on the right channel?",
             "Turn the horn by hand with the power off: does the motor turn with it?",
         ],
@@ -51,7 +51,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
         checks: &[
             "Is the horn screw tight, and is the linkage in the right hole?",
             "Measure the supply while the servo moves: does the voltage drop?",
-            "If the linkage was changed on purpose, learn the rig again.",
+            "If the linkage was changed on purpose, calibrate the rig again.",
         ],
     },
     KindText {
@@ -61,7 +61,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
             Some(format!("the servo answers {command} the wrong way round{known}"))
         }),
         checks: &[
-            "Was the servo replaced or its horn turned round?",
+            "Was the servo replaced or its horn reversed?",
             "Compare the sign of the axis in the rig's description with a small tilt by hand.",
         ],
     },
@@ -77,7 +77,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
         checks: &[
             "Is the plate level at zero command? Put a spirit level on it.",
             "Has the horn slipped on its teeth? Look at the horn screw.",
-            "Was the rig moved to another table? Then level it or learn it again.",
+            "Was the rig moved to another table? Then level it or calibrate it again.",
         ],
     },
     KindText {
@@ -157,7 +157,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
             Some(format!("readings stepped by {mm:.0} mm at {at_s:.2} s"))
         }),
         checks: &[
-            "Was the camera or the panel moved? Fasten it and learn the rig again.",
+            "Was the camera or the panel moved? Fasten it and calibrate the rig again.",
             "Did the sensor's program start again with another origin?",
         ],
     },

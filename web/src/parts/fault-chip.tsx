@@ -1,6 +1,6 @@
 import type { FaultCode, FaultKind } from "../api/types";
 import { faultTitle } from "../words/fault-names";
-import { chipClass, isPresent, stateText } from "../words/fault-state";
+import { chipClass, stateText } from "../words/fault-state";
 import type { FaultState } from "../words/severity";
 import { sinceText } from "../words/time";
 
@@ -12,16 +12,10 @@ interface Props {
   since?: string | null;
 }
 
-/** When a fault began to fail, to follow the text of its state. */
-function whenText(fault: FaultState, hasSession: boolean, since: string): string {
-  if (!fault.failing) return `, failed ${sinceText(since)}`;
-  return isPresent(fault, hasSession) ? ` since ${sinceText(since)}` : `, began ${sinceText(since)}`;
-}
-
 /** A fault, its state, and since when. */
 export function FaultChip({ fault, hasSession, since }: Props) {
   const title = faultTitle(fault.code, fault.kind);
-  const text = stateText(fault, hasSession) + (since ? whenText(fault, hasSession, since) : "");
+  const text = stateText(fault, hasSession, since ? sinceText(since) : undefined);
   return (
     <span class={chipClass(fault)} title={`${title}: ${text}`}>
       <b>{title}</b> <span>{text}</span>

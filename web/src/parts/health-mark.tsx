@@ -6,9 +6,9 @@ const MARKS: Record<RigHealth, { symbol: string; word: string }> = {
   recorded: { symbol: "△", word: "on record" },
   drift: { symbol: "◇", word: "drifting" },
   untested: { symbol: "◌", word: "not tested" },
-  unlearnt: { symbol: "◌", word: "not learnt" },
+  unlearnt: { symbol: "◌", word: "not calibrated" },
   ok: { symbol: "●", word: "no fault" },
-  silent: { symbol: "○", word: "silent" },
+  silent: { symbol: "○", word: "no data" },
   unknown: { symbol: "○", word: "not known" },
   idle: { symbol: "○", word: "no session" },
 };

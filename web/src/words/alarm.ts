@@ -2,22 +2,23 @@
 import type { Alarm, AlarmChange, AlarmCode } from "../api/alarms";
 import { faultPath, rigPath } from "../router/paths";
 import { codeTitle } from "./fault-names";
+import { statusWord } from "./fault-state";
 
 export const ALARM_CODES: AlarmCode[] = ["x_servo", "y_servo", "stuck_ball", "sensor", "communication_lost"];
 
 export const CHANGES: Record<AlarmChange, string> = {
-  pending: "fails, not confirmed yet",
-  confirmed: "fails, confirmed",
-  passed: "passes again",
+  pending: "suspected",
+  confirmed: "confirmed",
+  passed: "passing again",
   healed: "healed",
   cleared: "cleared by a person",
 };
 
 export const alarmCodeTitle = (code: AlarmCode) =>
-  code === "communication_lost" ? "Communication lost" : codeTitle(code);
+  code === "communication_lost" ? "No data" : codeTitle(code);
 
 export const alarmTitle = ({ code, kind }: Pick<Alarm, "code" | "kind">) =>
-  alarmCodeTitle(code) + (kind ? `, ${kind}` : "");
+  alarmCodeTitle(code) + (kind ? ` (${kind})` : "");
 
 /** The view that shows more of an alarm. */
 export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
@@ -36,7 +37,8 @@ export function alarmState(
   const isSuspected = failing && status === "pending";
   if (isSuspected)
     return { text: isNow ? "△ suspected" : "suspected when last tested", look: "status-pending" };
-  if (failing) return { text: isNow ? "▲ fails now" : "▲ failed when last tested", look: "status-confirmed" };
+  if (failing && code === "communication_lost") return { text: "▲ no data now", look: "status-confirmed" };
+  if (failing) return { text: isNow ? "▲ failing" : "▲ failed when last tested", look: "status-confirmed" };
   if (status === "healed") return { text: "healed", look: "status-healed" };
-  return { text: `passes, on record as ${status}`, look: "status-pending" };
+  return { text: `passing again; was ${statusWord(status)}`, look: "status-pending" };
 }

@@ -7,9 +7,9 @@ export function communicationText({ status, session, since }: CommunicationLine)
   const last = dateTime(since);
   if (status === "confirmed")
     return {
-      text: "lost",
+      text: "stopped",
       look: "status-confirmed",
-      sentence: `No data arrive although a session is open. The last arrived ${last}.`,
+      sentence: `No data since ${last}, though a session is open.`,
     };
   if (session == null)
     return {
@@ -20,6 +20,6 @@ export function communicationText({ status, session, since }: CommunicationLine)
   return {
     text: "back",
     look: "status-passed",
-    sentence: `Data arrive again. They had stayed away since ${last}.`,
+    sentence: `Data arrive again. There were none since ${last}.`,
   };
 }

@@ -13,24 +13,44 @@ export const CODES = Object.keys(CODE) as FaultCode[];
 
 interface KindWords {
   meaning: string;
+  /** The meaning for a fault whose test passes again. */
+  past: string;
   /** How the demo offers to inject it; `meaning` if it is missing. */
   injected?: string;
 }
 
 const KIND: Record<FaultKind, KindWords> = {
-  dead: { meaning: "no power: the plate returns to zero" },
-  held: { meaning: "holds its angle whatever the command" },
-  gain: { meaning: "moves too little or too much" },
-  reversed: { meaning: "moves in the wrong direction" },
-  offset: { meaning: "constant angle error, as with a slipped horn" },
-  slow: { meaning: "follows the command far too slowly" },
-  intermittent: { meaning: "fails intermittently, as with a loose contact" },
-  frozen: { meaning: "repeats its last reading" },
-  dropout: { meaning: "gives no readings" },
-  noise: { meaning: "is much noisier than learnt", injected: "much noisier readings" },
-  spikes: { meaning: "gives single readings that are far off", injected: "single readings that are far off" },
+  dead: {
+    meaning: "does not respond: the plate returns to zero",
+    past: "did not respond: the plate returned to zero",
+  },
+  held: { meaning: "holds its angle whatever the command", past: "held its angle whatever the command" },
+  gain: { meaning: "moves too little or too much", past: "moved too little or too much" },
+  reversed: { meaning: "moves in the wrong direction", past: "moved in the wrong direction" },
+  offset: {
+    meaning: "has a constant angle error, as with a slipped horn",
+    past: "had a constant angle error, as with a slipped horn",
+  },
+  slow: { meaning: "follows the command far too slowly", past: "followed the command far too slowly" },
+  intermittent: {
+    meaning: "fails intermittently, as with a loose contact",
+    past: "failed intermittently, as with a loose contact",
+  },
+  frozen: { meaning: "repeats its last reading", past: "repeated its last reading" },
+  dropout: { meaning: "gives no readings", past: "gave no readings" },
+  noise: {
+    meaning: "is much noisier than at its calibration",
+    past: "was much noisier than at its calibration",
+    injected: "much noisier readings",
+  },
+  spikes: {
+    meaning: "gives single readings that are far off",
+    past: "gave single readings that were far off",
+    injected: "single readings that are far off",
+  },
   jump: {
-    meaning: "readings are shifted by a constant offset",
+    meaning: "gives readings that are shifted by a constant offset",
+    past: "gave readings that were shifted by a constant offset",
     injected: "readings shifted by a constant offset",
   },
 };
@@ -46,16 +66,27 @@ const isFaultKind = (kind: string): kind is FaultKind => Object.hasOwn(KIND, kin
 export const codeTitle = (code: string) => (isFaultCode(code) ? CODE[code].title : plain(code));
 
 /** What is wrong if the kind of the fault is not known. */
-const FAULT: Record<FaultCode, string> = {
-  x_servo: "the ball does not move along x as commanded",
-  y_servo: "the ball does not move along y as commanded",
-  stuck_ball: CODE.stuck_ball.meaning,
-  sensor: "the readings are implausible",
+const FAULT: Record<FaultCode, KindWords> = {
+  x_servo: {
+    meaning: "the ball does not move along x as commanded",
+    past: "the ball did not move along x as commanded",
+  },
+  y_servo: {
+    meaning: "the ball does not move along y as commanded",
+    past: "the ball did not move along y as commanded",
+  },
+  stuck_ball: {
+    meaning: CODE.stuck_ball.meaning,
+    past: "the ball did not roll although the plate was tilted",
+  },
+  sensor: { meaning: "the readings are implausible", past: "the readings were implausible" },
 };
 
-/** Returns what is wrong with the rig. */
-export const faultMeaning = (code: FaultCode, kind?: FaultKind | null) =>
-  kind ? kindMeaning(kind) : (FAULT[code] ?? plain(code));
+/** Returns what is wrong with the rig, or was if the test of the fault passes again. */
+export function faultMeaning(code: FaultCode, kind?: FaultKind | null, isOver = false): string {
+  const words = kind ? KIND[kind] : FAULT[code];
+  return words?.[isOver ? "past" : "meaning"] ?? plain(kind ?? code);
+}
 
 export const codeMeaning = (code: FaultCode) => CODE[code]?.meaning ?? "";
 
@@ -67,4 +98,4 @@ export const injectedMeaning = (kind: string) =>
   isFaultKind(kind) ? (KIND[kind].injected ?? KIND[kind].meaning) : null;
 
 export const faultTitle = (code: FaultCode, kind?: FaultKind | null) =>
-  codeTitle(code) + (kind ? `, ${kind}` : "");
+  codeTitle(code) + (kind ? ` (${kind})` : "");

@@ -22,14 +22,28 @@ export const chipClass = (fault: FaultState) => {
  */
 export const isPresent = ({ tested }: FaultState, hasSession: boolean) => hasSession && tested;
 
-/** Returns the state of a fault as text; `hasSession` says whether a session is open. */
-export function stateText(fault: FaultState, hasSession = true): string {
+/** The word for a status of a fault. */
+export const statusWord = <T extends string>(status: T) => (status === "pending" ? "suspected" : status);
+
+/** A fault whose test passes again: what it was, with the time at which its test began to fail, if that is known. */
+function recordedText({ status }: FaultState, since?: string): string {
+  const was = since
+    ? `${status === "pending" ? "suspected" : "failed"} ${since}`
+    : `was ${statusWord(status)}`;
+  return `${was}, passes again`;
+}
+
+/**
+ * Returns the state of a fault as text. `hasSession` says whether a session is open, `since` when its test began to
+ * fail.
+ */
+export function stateText(fault: FaultState, hasSession = true, since?: string): string {
   const isNow = isPresent(fault, hasSession);
-  const failing = isNow ? "failing now" : "failed when last tested";
+  const began = since ? (isNow ? ` since ${since}` : `, began ${since}`) : "";
   const text = {
-    failing,
-    pending: isNow ? "failing, not yet confirmed" : "failed, not yet confirmed",
-    recorded: `on record${fault.status === "pending" ? " as pending" : ""}, passes again`,
+    failing: (isNow ? "failing" : "failed when last tested") + began,
+    pending: (isNow ? "suspected" : "suspected when last tested") + began,
+    recorded: recordedText(fault, since),
     none: fault.status,
   }[standing(fault)];
   return fault.acknowledged && standing(fault) !== "none" ? `${text}, acknowledged` : text;
@@ -42,5 +56,5 @@ export const isRepair = (line: Pick<FaultLine, "status" | "status_byte">) =>
 /** What a line reports, as text and as a class of the style sheet. */
 export function changeOf(line: Pick<FaultLine, "status" | "status_byte">): { text: string; look: string } {
   if (isRepair(line)) return { text: "passes again", look: "status-passed" };
-  return { text: line.status, look: `status-${line.status}` };
+  return { text: statusWord(line.status), look: `status-${line.status}` };
 }

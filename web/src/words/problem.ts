@@ -8,10 +8,10 @@ const WORDS: Record<string, string> = {
     "There is a rig of this name already. Choose another name, or open that rig and change it in its set-up.",
   "unknown-asset": "There is no rig of this name. Register it under Set up first.",
   "nothing-offered":
-    "Nothing that was learnt waits for an answer. It was answered before, or the rig must move more first.",
+    "No calibration waits for an answer. It was answered before, or the rig must move more first.",
   "already-learnt":
-    "This rig has been learnt already. Learn it again from sessions that you choose in its set-up, or use an " +
-    "earlier one of its calibrations.",
+    "This rig is calibrated already. Calibrate it again from sessions that you choose in its set-up, or restore " +
+    "an earlier calibration.",
 };
 
 /** Returns the words for a problem whose detail is for programs; undefined if its detail is for people. */

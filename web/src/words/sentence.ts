@@ -1,7 +1,7 @@
 /** The sentences of fault lines. */
 import type { FaultLine } from "../api/types";
 import { CODES, codeTitle } from "./fault-names";
-import { isRepair } from "./fault-state";
+import { isRepair, statusWord } from "./fault-state";
 import { dateTime } from "./time";
 
 /** Returns the summary of a fault line as a sentence, without its leading code. */
@@ -14,9 +14,10 @@ export const capitalised = (text: string) => text.charAt(0).toUpperCase() + text
 
 /** Returns what a line reports as a sentence: what was seen, or what became of the fault. */
 export function lineSentence(line: Pick<FaultLine, "status" | "status_byte" | "summary">): string {
-  if (isRepair(line)) return `Its test passes again; the fault stays on record as ${line.status}.`;
+  if (isRepair(line))
+    return `Its test passes again; the fault stays on record as ${statusWord(line.status)}.`;
   if (line.status === "healed") return "Enough sessions without the fault followed.";
-  if (line.status === "cleared") return "Nothing of it is on record any more.";
+  if (line.status === "cleared") return "It was removed from the fault memory.";
   return sentence(line.summary);
 }
 

@@ -15,14 +15,14 @@ export const STATUS_BITS = [
   {
     bit: 5,
     name: "testFailedSinceLastClear",
-    on: "The test has failed since the code was last cleared.",
-    off: "The test has not failed since the code was last cleared.",
+    on: "The test has failed since the fault was last cleared.",
+    off: "The test has not failed since the fault was last cleared.",
   },
   {
     bit: 4,
     name: "testNotCompletedSinceLastClear",
-    on: "The test has not completed since the code was last cleared.",
-    off: "The test has completed since the code was last cleared.",
+    on: "The test has not completed since the fault was last cleared.",
+    off: "The test has completed since the fault was last cleared.",
   },
   {
     bit: 3,
@@ -33,8 +33,8 @@ export const STATUS_BITS = [
   {
     bit: 2,
     name: "pendingDTC",
-    on: "Pending: it failed in this session or the previous one.",
-    off: "Not pending.",
+    on: "Suspected: it failed in this session or the previous one.",
+    off: "Not suspected.",
   },
   {
     bit: 1,

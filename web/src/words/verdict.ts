@@ -1,5 +1,5 @@
 /** The verdict of a session as text. */
-import type { Candidate, FaultCode, FaultLine, Outcome, Summary } from "../api/types";
+import type { Candidate, FaultCode, FaultLine, JudgedMonitor, Outcome, Summary } from "../api/types";
 import { codeTitle, faultTitle } from "./fault-names";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
@@ -15,12 +15,20 @@ export const judgedShare = (monitor: { judged_share?: number; judged_s?: number 
 export function ambiguousCauses(candidates: Candidate[]): string {
   if (!candidates.some(({ code }) => code !== candidates[0]!.code)) return "";
   const [first, ...others] = candidates.map(
-    ({ code, kind, weight }) => `${faultTitle(code, kind)} (${Math.round(weight * 100)} %)`,
+    ({ code, kind, weight }) => `${faultTitle(code, kind)} ${Math.round(weight * 100)} %`,
   );
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
 type Finding = Pick<FaultLine, "code" | "kind" | "status">;
+
+const RESULTS: Partial<Record<Outcome, string>> = { pending: "suspected", "not learnt": "not calibrated" };
+
+/** The word for the result of a monitor. */
+export const resultText = (outcome: Outcome) => RESULTS[outcome] ?? outcome;
+
+/** Whether `profile` has a test for a code: that of the book tests the servos only. */
+const hasTest = (code: string, profile?: string | null) => profile !== "textbook" || code.endsWith("_servo");
 
 /**
  * Returns the title of a fault with the kind that was confirmed first and those named later, or its candidates if its
@@ -40,27 +48,32 @@ export interface Verdict {
   look: string;
 }
 
+/** The titles of the monitors with a result, after `words`; empty without any. */
+function listed(monitors: JudgedMonitor[], outcome: Outcome, words: string): string {
+  const titles = monitors.filter((each) => each.outcome === outcome).map(({ code }) => codeTitle(code));
+  return titles.length ? `${words}: ${titles.join(", ")}` : "";
+}
+
 /**
  * Returns the result of a session, with the monitors that did not judge it, and its style. The kinds of its faults are
- * in the lines of their changes.
+ * in the lines of their changes. `profile` is the one that it was judged by, if that is known.
  */
-export function verdict(summary: Summary, lines: Finding[] = []): Verdict {
+export function verdict(summary: Summary, lines: Finding[] = [], profile?: string | null): Verdict {
   if (summary.outcome === "not judged") return { text: "Not judged", look: "quiet" };
-  const titles = (outcome: Outcome) => {
-    const monitors = (summary.monitors ?? []).filter((monitor) => monitor.outcome === outcome);
-    return monitors.map((monitor) => codeTitle(monitor.code)).join(", ");
-  };
+  const all = summary.monitors ?? [];
+  const tested = all.filter(({ code }) => hasTest(code, profile));
+  const others = all.filter(({ code }) => !hasTest(code, profile));
   const found = summary.faults.map((code) => faultText(summary, code, lines)).join(", ");
-  const pending = titles("pending");
-  const passed = titles("no fault");
-  const notLearnt = titles("not learnt");
-  const notJudged = titles("not judged");
-  const rest = [notLearnt && `not learnt: ${notLearnt}`, notJudged && `not judged: ${notJudged}`].filter(
-    Boolean,
-  );
+  const suspected = listed(all, "pending", "Suspected only");
+  const passed = listed(all, "no fault", "No fault");
+  const rest = [
+    listed(all, "not learnt", "not calibrated"),
+    listed(tested, "not judged", "not judged"),
+    listed(others, "not judged", "no test in this profile"),
+  ].filter(Boolean);
   const text = (first: string) => capitalised([first, ...rest].filter(Boolean).join("; "));
   if (found) return { text: text(found), look: "status-confirmed" };
-  if (pending) return { text: text(`Pending only: ${pending}`), look: "status-pending" };
-  if (rest.length) return { text: text(passed && `No fault of ${passed}`), look: "quiet" };
+  if (suspected) return { text: text(suspected), look: "status-pending" };
+  if (rest.length) return { text: text(passed), look: "quiet" };
   return { text: "No fault", look: "status-ok" };
 }

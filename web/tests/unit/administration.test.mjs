@@ -26,10 +26,10 @@ test("the form says what is missing", () => {
   assert.equal(obstacle({ ...draft, expires: "2026-03-01T10:00" }, NOW), "");
 });
 
-test("a token is in force until it expires or is revoked", () => {
+test("a token is valid until it expires or is revoked", () => {
   const state = (token) => [isInForce(token, NOW), tokenState(token, NOW)];
-  assert.deepEqual(state({}), [true, "in force"]);
-  assert.deepEqual(state({ expires_at: at(1) }), [true, `in force until ${dateTime(at(1))}`]);
+  assert.deepEqual(state({}), [true, "valid"]);
+  assert.deepEqual(state({ expires_at: at(1) }), [true, `valid until ${dateTime(at(1))}`]);
   assert.deepEqual(state({ expires_at: at(-1) }), [false, `expired ${dateTime(at(-1))}`]);
   assert.deepEqual(state({ expires_at: at(1), revoked_at: at(-2) }), [false, `revoked ${dateTime(at(-2))}`]);
 });

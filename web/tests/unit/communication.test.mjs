@@ -45,7 +45,7 @@ test("each loss of communication is an event of its own", () => {
 
 test("an event of lost communication says whether data are awaited", () => {
   const words = (status, more) => communicationText(communication(status, more));
-  assert.match(words("confirmed").sentence, /No data arrive although a session is open/);
+  assert.match(words("confirmed").sentence, /^No data since .*, though a session is open\.$/);
   assert.equal(words("passed").text, "back");
   assert.equal(words("passed", { session: null }).text, "no longer expected");
 });
@@ -64,12 +64,14 @@ test("a rig is tested while only its lost communication is muted", () => {
   assert.equal(alarmState({ ...alarm, code: "communication_lost" }).text, "muted by ada");
   assert.equal(alarmState({ ...alarm, code: "sensor" }).text, "not tested (muted by ada)");
   const failing = { ...alarm, code: "sensor", muted: null };
-  assert.equal(alarmState(failing).text, "▲ fails now");
+  assert.equal(alarmState(failing).text, "▲ failing");
   assert.equal(alarmState({ ...failing, tested: false }).text, "▲ failed when last tested");
   const suspected = { ...failing, status: "pending" };
   assert.deepEqual(alarmState(suspected), { text: "△ suspected", look: "status-pending" });
   assert.equal(alarmState({ ...suspected, tested: false }).text, "suspected when last tested");
   const ended = { ...failing, session_open: false };
   assert.equal(alarmState(ended).text, "▲ failed when last tested");
-  assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ fails now");
+  assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ no data now");
+  const passing = { ...failing, failing: false };
+  assert.equal(alarmState({ ...passing, status: "pending" }).text, "passing again; was suspected");
 });

@@ -38,8 +38,8 @@ test("the demo's faults are grouped by code and named in words", () => {
     groups.get("x_servo").map(({ effect }) => effect),
     ["dead", "slow"],
   );
-  assert.equal(faultList(["x_servo:dead", "sensor:noise"]), "X servo, dead; Position sensor, noise");
-  assert.equal(faultList(["sensor:freeze", "y_servo:hold"]), "Position sensor, frozen; Y servo, held");
+  assert.equal(faultList(["x_servo:dead", "sensor:noise"]), "X servo (dead), Position sensor (noise)");
+  assert.equal(faultList(["sensor:freeze", "y_servo:hold"]), "Position sensor (frozen), Y servo (held)");
 });
 
 test("the example is the chosen session, otherwise the preferred one without a fault", () => {

@@ -13,7 +13,7 @@ import { isFailing, STATUS_BITS } from "../../src/words/status-byte.ts";
 import { ambiguousCauses, judgedShare, verdict } from "../../src/words/verdict.ts";
 
 test("known codes and kinds have titles, unknown ones are shown as plain text", () => {
-  assert.equal(faultTitle("x_servo", "gain"), "X servo, gain");
+  assert.equal(faultTitle("x_servo", "gain"), "X servo (gain)");
   assert.equal(faultTitle("x_servo"), "X servo");
   assert.equal(codeTitle("new_code"), "new code");
   assert.equal(kindMeaning("new_kind"), "new kind");
@@ -25,7 +25,7 @@ test("a job that waits tells for what, another one what it does", () => {
   assert.equal(jobText({ waits: { reason: "jobs", n_before: 0 } }, "Judging"), "Judging…");
   assert.equal(jobText({ waits: { reason: "jobs", n_before: 1 } }, "Judging"), "Waiting for 1 other job…");
   const samples = { reason: "samples", n_before: 0 };
-  assert.equal(jobText({ waits: samples }, "Learning"), "Waiting until fewer samples are queued…");
+  assert.equal(jobText({ waits: samples }, "Calibrating"), "Waiting until fewer samples are queued…");
 });
 
 test("severity decreases from failing over acknowledged and pending to on record", () => {
@@ -53,13 +53,15 @@ test("severity decreases from failing over acknowledged and pending to on record
 test("a fault that fails now, one on record and an acknowledged one look different", () => {
   const fails = { status: "confirmed", failing: true, tested: true };
   const passes = { status: "confirmed", failing: false, tested: true };
-  assert.equal(stateText(fails), "failing now");
+  assert.equal(stateText(fails), "failing");
+  assert.equal(stateText(fails, true, "6:09"), "failing since 6:09");
   assert.equal(stateText(fails, false), "failed when last tested", "no session is open");
   const earlier = { ...fails, tested: false };
   assert.equal(stateText(earlier), "failed when last tested", "in a session before the open one");
-  assert.equal(stateText({ ...earlier, status: "pending" }), "failed, not yet confirmed");
-  assert.equal(stateText(passes), "on record, passes again");
-  assert.equal(stateText({ ...fails, acknowledged: true }), "failing now, acknowledged");
+  assert.equal(stateText({ ...earlier, status: "pending" }), "suspected when last tested");
+  assert.equal(stateText(passes), "was confirmed, passes again");
+  assert.equal(stateText({ ...passes, status: "pending" }, true, "6:09"), "suspected 6:09, passes again");
+  assert.equal(stateText({ ...fails, acknowledged: true }), "failing, acknowledged");
   assert.equal(stateText({ status: "cleared", failing: false, acknowledged: true }), "cleared");
   const looks = [fails, passes, { ...fails, acknowledged: true }, { status: "pending", failing: true }];
   assert.equal(new Set(looks.map(chipClass)).size, looks.length);
@@ -84,7 +86,8 @@ test("a test that passes again is told as a repair and not as an alarm", () => {
 });
 
 test("a banner says what is wrong, also if the kind is not known", () => {
-  assert.equal(faultMeaning("x_servo", "dead"), "no power: the plate returns to zero");
+  assert.equal(faultMeaning("x_servo", "dead"), "does not respond: the plate returns to zero");
+  assert.equal(faultMeaning("x_servo", "dead", true), "did not respond: the plate returned to zero");
   assert.equal(faultMeaning("sensor"), "the readings are implausible");
 });
 
@@ -120,7 +123,7 @@ test("the lowest bit of the status byte says whether the test fails", () => {
 test("candidates in different parts of the rig are named with their weights", () => {
   const x = { code: "x_servo", kind: "gain", weight: 0.7 };
   const y = { code: "y_servo", weight: 0.3 };
-  assert.equal(ambiguousCauses([x, y]), "Cannot tell: X servo, gain (70 %) or Y servo (30 %)");
+  assert.equal(ambiguousCauses([x, y]), "Cannot tell: X servo (gain) 70 % or Y servo 30 %");
   assert.equal(ambiguousCauses([x, { ...x, kind: "offset" }]), "", "two kinds in the same part");
   assert.equal(ambiguousCauses([]), "");
 });
@@ -138,15 +141,15 @@ test("a verdict lists the faults and the monitors without a result", () => {
     [summary(passed), "No fault", "status-ok"],
     [
       summary({ ...passed, x_servo: "not learnt" }),
-      "No fault of Position sensor; not learnt: X servo",
+      "No fault: Position sensor; not calibrated: X servo",
       "quiet",
     ],
     [
       summary({ x_servo: "not learnt", sensor: "not judged" }),
-      "Not learnt: X servo; not judged: Position sensor",
+      "Not calibrated: X servo; not judged: Position sensor",
       "quiet",
     ],
-    [summary({ ...passed, x_servo: "pending" }), "Pending only: X servo", "status-pending"],
+    [summary({ ...passed, x_servo: "pending" }), "Suspected only: X servo", "status-pending"],
     [summary(passed, ["x_servo", "y_servo"]), "X servo, Y servo", "status-confirmed"],
     [
       summary({ sensor: "not judged" }, ["x_servo"]),
@@ -156,6 +159,8 @@ test("a verdict lists the faults and the monitors without a result", () => {
     [summary({}, [], "not judged"), "Not judged", "quiet"],
   ];
   for (const [of, text, look] of cases) assert.deepEqual(verdict(of), { text, look });
+  const book = verdict(summary({ x_servo: "no fault", sensor: "not judged" }), [], "textbook");
+  assert.equal(book.text, "No fault: X servo; no test in this profile: Position sensor");
 });
 
 test("an ambiguous fault is shown with its candidates", () => {
@@ -164,7 +169,7 @@ test("an ambiguous fault is shown with its candidates", () => {
     { code: "x_servo", weight: 0.5 },
     { code: "stuck_ball", weight: 0.5 },
   ];
-  assert.equal(verdict(of).text, "Cannot tell: X servo (50 %) or Stuck ball (50 %)");
+  assert.equal(verdict(of).text, "Cannot tell: X servo 50 % or Stuck ball 50 %");
 });
 
 test("a judged share has its duration", () => {

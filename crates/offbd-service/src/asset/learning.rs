@@ -221,10 +221,10 @@ impl Asset {
         match self.learning.state(self.rig.calibration.is_some()) {
             LearningState::Gathering => self.describe_gathering(open),
             LearningState::Learning => {
-                format!("Enough motion gathered: the rig is being learnt from {sessions}.")
+                format!("Enough motion gathered: the rig is being calibrated from {sessions}.")
             }
             LearningState::Offered => {
-                format!("Learnt from {sessions}: was the rig healthy during these recordings?")
+                format!("Calibrated from {sessions}: was the rig healthy during these recordings?")
             }
             LearningState::Learnt => self.describe_calibration(&sessions),
         }
@@ -234,7 +234,7 @@ impl Asset {
     fn describe_gathering(&self, open: Option<&TrainingSession>) -> String {
         let misfits = self.open.as_ref().map(|open| open.judging.misfits()).unwrap_or_default();
         if let Some(misfit) = misfits.into_iter().find(|misfit| misfit.prevents_learning()) {
-            return format!("The rig cannot be learnt from this telemetry: {misfit}.");
+            return format!("The rig cannot be calibrated from this telemetry: {misfit}.");
         }
         if self.open.as_ref().is_some_and(|open| !open.is_known()) {
             return "The motion of the open session counts again with its next sample.".to_owned();
@@ -274,14 +274,15 @@ impl Asset {
     fn describe_calibration(&self, sessions: &str) -> String {
         let mut text = match (self.learning.is_automatic(), self.learning.refines()) {
             (false, _) => {
-                format!("Learnt from {sessions} chosen by a person; not refined automatically.")
+                format!("Calibrated from {sessions} chosen by a person; not refined automatically.")
             }
             (true, true) => format!(
-                "Learnt from {sessions}; further healthy sessions refine it until it is based on \
-                 {REFINED_SESSIONS}."
+                "Calibrated from {sessions}; further healthy sessions refine it until it is based \
+                 on {REFINED_SESSIONS}."
             ),
             (true, false) => format!(
-                "Learnt from {sessions}; no longer refined, so that later drift can be detected."
+                "Calibrated from {sessions}; no longer refined, so that later drift can be \
+                 detected."
             ),
         };
         if let Some(refusal) = self.learning.refusal() {

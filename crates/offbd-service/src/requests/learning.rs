@@ -16,7 +16,9 @@ impl Service {
         let id = view.calibration.as_ref().filter(|_| view.state == LearningState::Learning);
         if let Some(wait) = id.and_then(|id| self.inner.jobs.wait(id)) {
             view.summary += &match wait.reason {
-                JobWaitReason::Jobs => format!(" Rigs to be learnt before it: {}.", wait.n_before),
+                JobWaitReason::Jobs => {
+                    format!(" Rigs to be calibrated before it: {}.", wait.n_before)
+                }
                 JobWaitReason::Samples => " It waits until fewer samples are queued.".to_owned(),
             };
         }

@@ -19,9 +19,7 @@ export function AuditCard({ list, tokenName }: Props) {
   return (
     <section class="card">
       <h2>Audit log</h2>
-      <p class="quiet">
-        Who changed what, the latest first. What was refused is in the log of the service instead.
-      </p>
+      <p class="quiet">Who changed what, the latest first. Refusals are in the service log.</p>
       <ErrorMessage error={error} retry={refetch} />
       {!entries && !error && <Loading what="the audit log" />}
       {entries?.length === 0 && <p class="quiet">Nothing yet.</p>}

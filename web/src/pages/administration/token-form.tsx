@@ -52,7 +52,7 @@ export function TokenForm({ made }: { made: (token: NewToken) => void }) {
         </label>
       </div>
       <p class="quiet">
-        The name of the token is recorded with every action of whoever uses it: one token for each person and
+        The name of the token is recorded with every action of its holder: one token for each person and
         device.
       </p>
       <div class="form-end">

@@ -45,7 +45,7 @@ export function TokenRow({ token, now, isOwn, changed }: Props) {
             question={`Revoke the token ${name}?`}
             action={revoke}
           >
-            Whoever uses it is refused at once, its logins and streams end. This cannot be undone.
+            Its holder is logged out and refused at once, and its streams end. This cannot be undone.
             {isOwn && " You are logged in with this token yourself: you will be logged out."}
           </ConfirmButton>
         )}

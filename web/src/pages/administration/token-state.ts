@@ -16,6 +16,6 @@ export const isInForce = ({ expires_at, revoked_at }: Token, now: number): boole
 export function tokenState(token: Token, now: number): string {
   const { expires_at, revoked_at } = token;
   if (revoked_at) return `revoked ${dateTime(revoked_at)}`;
-  if (!expires_at) return "in force";
-  return isInForce(token, now) ? `in force until ${dateTime(expires_at)}` : `expired ${dateTime(expires_at)}`;
+  if (!expires_at) return "valid";
+  return isInForce(token, now) ? `valid until ${dateTime(expires_at)}` : `expired ${dateTime(expires_at)}`;
 }

@@ -19,7 +19,7 @@ export function TokenTable({ tokens, changed }: Props) {
   const isOwn = (token: Token) => token.name === caller?.name && isInForce(token, now);
   return (
     <>
-      {!shown.length && <p class="quiet">No token is in force.</p>}
+      {!shown.length && <p class="quiet">No valid token.</p>}
       {shown.length > 0 && (
         <div class="scroll">
           <table class="list alarms">

@@ -17,6 +17,8 @@ interface Props {
 export function AlarmRow({ alarm, now, advice, refetchAdvice, isChosen, toggle }: Props) {
   const { asset, acknowledgement, evidence, since } = alarm;
   const { text, look } = alarmState(alarm);
+  // Without data there is none, which the alarm itself says.
+  const hasEvidence = alarm.code !== "communication_lost";
   return (
     <tr>
       <td>
@@ -39,7 +41,7 @@ export function AlarmRow({ alarm, now, advice, refetchAdvice, isChosen, toggle }
             <WhatToDo fault={alarm} advice={advice} refetch={refetchAdvice} />
           </details>
         )}
-        {evidence.reason && <p class="quiet small-text">Evidence: {evidence.reason}.</p>}
+        {hasEvidence && evidence.reason && <p class="quiet small-text">Evidence: {evidence.reason}.</p>}
       </td>
       <td>
         <span class={look}>{text}</span>

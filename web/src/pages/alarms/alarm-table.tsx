@@ -27,7 +27,7 @@ export function AlarmTable({ alarms, now, advice, refetchAdvice, chosen, choose 
             <th>
               <input
                 type="checkbox"
-                aria-label="Choose all that nobody has acknowledged"
+                aria-label="Choose all that are unacknowledged"
                 checked={areAllChosen}
                 disabled={!open.length}
                 onChange={() => choose(new Set(areAllChosen ? [] : open))}

@@ -10,8 +10,8 @@ import { LastChangeChoice } from "./last-change-choice";
 const STATES = [
   ["active", "Failing or on record"],
   ["failing", "Failing"],
-  ["on_record", "Passing, on record"],
-  ["all", "All, healed ones too"],
+  ["on_record", "Passing again, on record"],
+  ["all", "All, including healed"],
 ] as const;
 
 interface Props {
@@ -50,7 +50,7 @@ export function AlarmTools({ filter, hours, change }: Props) {
           checked={filter.acknowledged === false}
           onChange={(e) => change("acknowledged", e.currentTarget.checked ? "false" : "")}
         />
-        Nobody has acknowledged
+        Unacknowledged only
       </label>
     </div>
   );

@@ -2,7 +2,7 @@
 import { alarmApi } from "../../api/alarms";
 import { useNow } from "../../hooks/use-now";
 import { useQuery } from "../../hooks/use-query";
-import { useTitle } from "../../hooks/use-title";
+import { useTitle, withNumber } from "../../hooks/use-title";
 import { ActionButton } from "../../parts/action-button";
 import { EmptyState } from "../../parts/empty-state";
 import { ErrorMessage } from "../../parts/error-message";
@@ -17,9 +17,9 @@ import { useAlarmFilter } from "./use-alarm-filter";
 import { useAlarms } from "./use-alarms";
 
 export function AlarmsPage() {
-  useTitle("Alarms");
   const { filter, hours, change } = useAlarmFilter();
   const { alarms, error, refetch, loadMore } = useAlarms(filter);
+  useTitle(withNumber("Alarms", alarms?.length ?? 0, loadMore !== undefined));
   const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms ?? [], refetch);
   const advice = useQuery(alarmApi.advice, "advice");
   const now = useNow();
@@ -28,7 +28,7 @@ export function AlarmsPage() {
       <header class="page-head">
         <h1>Alarms</h1>
         <div class="page-tools">
-          <Link to="/notifications">Who is told</Link>
+          <Link to="/notifications">Notifications</Link>
           <SavedViews page="/alarms" />
           <AcknowledgeTools open={open} acknowledge={acknowledge} />
         </div>
@@ -42,8 +42,8 @@ export function AlarmsPage() {
       )}
       {!alarms && !error && <Loading what="the alarms" />}
       {alarms?.length === 0 && (
-        <EmptyState title="No alarm">
-          <p>Nothing that the filter selects fails or is on record.</p>
+        <EmptyState title="No alarms">
+          <p>No alarm matches this filter.</p>
         </EmptyState>
       )}
       {alarms && alarms.length > 0 && (

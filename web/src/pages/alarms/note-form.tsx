@@ -25,12 +25,12 @@ export function NoteForm({ code, text, refetch, close }: Props) {
   return (
     <div class="note-form">
       <label>
-        Note on every fault “{alarmCodeTitle(code)}”
+        Remark on every fault “{alarmCodeTitle(code)}”
         <textarea rows={3} maxLength={2000} value={draft} onInput={(e) => setDraft(e.currentTarget.value)} />
       </label>
       <ActorField actor={actor} />{" "}
       <ActionButton class="small" action={save} needs="operator">
-        Keep
+        Save
       </ActionButton>{" "}
       <button type="button" class="small" onClick={close}>
         Cancel

@@ -31,7 +31,7 @@ export function OwnNote({ code, advice, refetch }: Props) {
         title={refused}
         onClick={() => setEdited(true)}
       >
-        {note ? "Edit the note" : "Add a note"}
+        {note ? "Edit the remark" : "Add a remark"}
       </button>
     </p>
   );

@@ -29,7 +29,7 @@ export function ActiveFaults({ asset, faults, hasSession }: Props) {
                 hasSession={hasSession}
                 since={last_occurrence?.noted_at}
               />{" "}
-              <span>{ambiguousCauses(candidates) || faultMeaning(code, kind)}</span>{" "}
+              <span>{ambiguousCauses(candidates) || faultMeaning(code, kind, !state.failing)}</span>{" "}
               <span class="more">Look at it →</span>
             </Link>
           </li>

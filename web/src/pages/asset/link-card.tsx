@@ -57,8 +57,8 @@ function CommunicationMute({ asset }: { asset: string }) {
     <div class="mute-line">
       <span class="quiet">
         {mute
-          ? `Nobody is told if data stay away: muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`
-          : "An alarm is raised if data stay away while a session is open."}
+          ? `No alarm if data stop: muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`
+          : "Alarms if data stop during a session."}
       </span>
       <MuteButton asset={asset} code="communication_lost" mute={mute} changed={refetch} />
     </div>
@@ -82,8 +82,8 @@ export function LinkCard({ asset }: { asset: string }) {
         <>
           <LinkTable link={link} />
           <p class="quiet small-text">
-            Rate and spacing are by the clock of the device, which {clockText(link.clock_offset_s)}. A gap is
-            longer than {seconds(link.gap_s, 1)}; evidence begins anew after it. The delay is that behind the
+            Rate and spacing are by the clock of the device, which {clockText(link.clock_offset_s)}. Pauses
+            over {seconds(link.gap_s, 1)} are gaps and restart the evaluation. Delay is relative to the
             fastest batch.
           </p>
         </>

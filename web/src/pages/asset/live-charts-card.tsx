@@ -74,8 +74,7 @@ function DrawnCharts({ charts: { group, zoomTo, seek } }: { charts: LiveCharts }
       <RigCharts group={group} kinds={ALL_CHARTS} height={136} onZoom={zoomTo} onSeek={seek} />
       <p class="quiet small-text">
         Time on the device's clock, s. The band around the residual is its limit. The residual is judged only
-        where the background is shaded: while the servo is under test. Drag over a chart to pause and zoom in,
-        double-click to go on.
+        where the background is shaded. Drag over a chart to pause and zoom in, double-click to go on.
       </p>
     </>
   );

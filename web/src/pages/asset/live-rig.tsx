@@ -40,7 +40,7 @@ function Notices({ isLost, state }: { isLost: boolean; state?: State }) {
       )}
       {state?.unjudged && (
         <p class="trouble" role="alert">
-          Not tested: {count(state.unjudged.samples)} of its latest samples are not judged (
+          Not tested: {count(state.unjudged.samples)} recent samples could not be used (
           {state.unjudged.reason}).
         </p>
       )}

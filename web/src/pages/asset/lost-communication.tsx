@@ -24,8 +24,8 @@ export function LostCommunication({ alarm, refetch }: Props) {
   return (
     <div class={muted ? "note" : "trouble"} role="alert">
       <span>
-        <b>Communication lost{since && ` since ${sinceText(since)}`}.</b> A session is open, but no data
-        arrive. {acknowledgement && `Acknowledged by ${acknowledgement.by}, ${dateTime(acknowledgement.at)}.`}
+        <b>No data{since && ` since ${sinceText(since)}`}</b>, though a session is open.{" "}
+        {acknowledgement && `Acknowledged by ${acknowledgement.by}, ${dateTime(acknowledgement.at)}.`}
         {muted && ` Muted by ${muted.by} until ${dateTime(muted.until)}: ${muted.reason}`}
       </span>
       {isOpen && <ActorField actor={actor} />}

@@ -63,10 +63,8 @@ export function MuteButton({ asset, code, mute, changed }: Props) {
 }
 
 const MONITOR_EFFECT =
-  "The monitor is shown as not tested, and nobody is told of what it finds. " +
-  "The fault memory records it all the same.";
-const COMMUNICATION_EFFECT =
-  "Nobody is told if data stay away; the page and the history show it all the same.";
+  "The monitor is shown as not tested, and what it finds causes no notification. It is still recorded.";
+const COMMUNICATION_EFFECT = "No notification is sent if data stop. The page and the history still show it.";
 
 function MuteDialog({ asset, code, changed, close }: Omit<Props, "mute"> & { close: () => void }) {
   const [reason, setReason] = useState("");

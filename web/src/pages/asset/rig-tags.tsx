@@ -3,6 +3,7 @@ import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
 import { ActionButton } from "../../parts/action-button";
 import { Dialog } from "../../parts/dialog";
+import { useRefusal } from "../../parts/login/rights";
 import { Link } from "../../router/link";
 import { fleetPath } from "../../router/paths";
 import { tagsIn } from "../../words/tags";
@@ -11,6 +12,7 @@ import { tagsIn } from "../../words/tags";
 export function RigTags({ asset }: { asset: string }) {
   const { data: tags, refetch } = useQuery(() => tagApi.of(asset), `${asset} tags`);
   const [isOpen, setOpen] = useState(false);
+  const refused = useRefusal("operator");
   if (!tags) return null;
   return (
     <div class="chips">
@@ -19,7 +21,13 @@ export function RigTags({ asset }: { asset: string }) {
           {tag}
         </Link>
       ))}
-      <button type="button" class="small" onClick={() => setOpen(true)}>
+      <button
+        type="button"
+        class="small"
+        disabled={refused !== undefined}
+        title={refused}
+        onClick={() => setOpen(true)}
+      >
         {tags.length ? "Change tags" : "Add tags"}
       </button>
       {isOpen && <TagsDialog asset={asset} tags={tags} changed={refetch} close={() => setOpen(false)} />}
@@ -50,7 +58,7 @@ function TagsDialog({ asset, tags, changed, close }: DialogProps) {
       <p class="quiet">At most 20 words of letters, digits, “-”, “_” and “.”, such as a room or a line.</p>
       <div class="form-end">
         <ActionButton class="primary" action={save} needs="operator">
-          Keep
+          Save
         </ActionButton>
       </div>
     </Dialog>

@@ -20,7 +20,7 @@ function servoFacts({ calibration }: Asset): Fact[] {
 /** The twin with which the rig is compared. */
 export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
   const { calibration } = asset;
-  const learnt =
+  const calibrated =
     calibration && `${dateTime(calibration.made_at)}, from ${count(calibration.samples)} samples`;
   return (
     <section class="card">
@@ -31,13 +31,13 @@ export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
           ["Reason", state?.fidelity_reason ?? NONE],
           ["Dimensions", dimensions(asset) + (hasDefaultDimensions(asset) ? " (the defaults)" : "")],
           ["Profile", asset.diagnostics?.profile ?? "default"],
-          ["Learnt", learnt ?? "not yet"],
+          ["Calibrated", calibrated ?? "not yet"],
           ...servoFacts(asset),
         ]}
       />
       <p>
         <button type="button" class="link" onClick={() => navigate(setUpPath(asset.name))}>
-          Describe or calibrate this rig
+          Edit set-up
         </button>
       </p>
     </section>

@@ -8,7 +8,7 @@ export function CalibrationCard({ n, calibration }: { n: number; calibration: Ca
   const open = undetermined(calibration);
   return (
     <section class="card">
-      <h2>What calibration {n} learnt</h2>
+      <h2>Values of calibration {n}</h2>
       {open.length > 0 && <p>Not determined: {open.join(", ")}.</p>}
       <CalibrationDetails calibration={calibration} />
       <h3>Uncertainty</h3>

@@ -23,9 +23,9 @@ export function CalibrationList({ name, jobs, sessions, refetch }: Props) {
   const chosen = done.find(({ job }) => job.id === id) ?? done.find(({ job }) => job.active) ?? done[0];
   if (!chosen)
     return (
-      <EmptyState title="This rig has not been learnt yet">
+      <EmptyState title="This rig is not calibrated yet">
         <p>
-          <Link to={setUpPath(name, "learn")}>Choose the recordings to learn it from</Link>
+          <Link to={setUpPath(name, "learn")}>Choose recordings for its calibration</Link>
         </p>
       </EmptyState>
     );

@@ -40,8 +40,8 @@ export function CalibrationRow({ name, job, n, sessions, isChosen, choose, refet
       <td>
         {!job.active && mayActivate && (
           <ConfirmButton
-            word="Use this one again"
-            question={`Use calibration ${n} again?`}
+            word="Restore this calibration"
+            question={`Restore calibration ${n}?`}
             action={() => api.activate(name, job.id).then(refetch)}
           >
             The next session is judged by it; a running one keeps the calibration that it began with.

@@ -2,7 +2,7 @@ import type { Session } from "../../api/types";
 import { CalibrationRow } from "./calibration-row";
 import type { DoneJob } from "./history";
 
-const COLUMNS = ["Number", "Made", "Learnt from", "State", "Action"];
+const COLUMNS = ["Number", "Made", "Made from", "State", "Action"];
 
 interface Props {
   name: string;

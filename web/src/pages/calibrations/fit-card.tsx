@@ -38,12 +38,11 @@ export function FitCard({ n, calibration, before, sessions }: Props) {
   const other = before === NO_CALIBRATION ? "without a calibration" : `with calibration ${n - 1}`;
   return (
     <section class="card">
-      <h2>Its fit over the data</h2>
+      <h2>Fit to the data</h2>
       <Choice isInline label="Session" options={choices} value={session} change={choose} />
       {before === NO_CALIBRATION && (
         <p class="quiet small-text">
-          A learnt rig is judged over a window as long as its noise requires, which alone makes the residual
-          smaller.
+          With a calibration, the averaging window adapts to the noise; that alone lowers the residual.
         </p>
       )}
       {fit.data && <Fit traces={fit.data} before={other} after={`with calibration ${n}`} />}

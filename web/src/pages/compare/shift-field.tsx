@@ -6,7 +6,7 @@ export function ShiftField({ shift, set }: { shift: number; set: (shift: number)
   };
   return (
     <label class="inline">
-      The second begins later by{" "}
+      Shift second session by{" "}
       <input type="number" step="0.1" value={shift} onInput={(e) => change(e.currentTarget.value)} /> s
     </label>
   );

@@ -25,7 +25,7 @@ const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Twin's acceleration", (axis) => acceleration(axis.twin_m_s2)],
   [RESIDUAL, (axis) => acceleration(axis.residual_m_s2)],
   ["Limit", (axis) => acceleration(axis.limit_m_s2)],
-  ["Under test", (axis) => (axis.enabled ? "yes" : "no")],
+  ["Judged", (axis) => (axis.enabled ? "yes" : "no")],
   [EVIDENCE, (axis) => number(axis.nats, 1, "nats")],
   [PATH, (axis) => millimetres(axis.path_error_m)],
   ["Largest deviation of a healthy rig", (axis) => millimetres(axis.path_limit_m)],

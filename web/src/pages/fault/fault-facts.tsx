@@ -3,7 +3,7 @@ import type { FaultEntry } from "../../api/types";
 import type { Fact } from "../../parts/facts";
 import { Link } from "../../router/link";
 import { calibrationsPath, sessionPath } from "../../router/paths";
-import { plural, seconds } from "../../words/numbers";
+import { NONE, plural, seconds } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 
 export function faultFacts(fault: FaultEntry, isPrinted = false): Fact[] {
@@ -15,7 +15,7 @@ export function faultFacts(fault: FaultEntry, isPrinted = false): Fact[] {
     ...occurrenceFacts("First", fault.first_occurrence, fault.first_onset_s),
     ...(occurrences > 1 ? occurrenceFacts("Last", fault.last_occurrence, fault.last_onset_s) : []),
     ...settingsFacts(fault, isPrinted),
-    ["Acknowledged", doneBy(acknowledgement) ?? (occurrences ? "not yet" : "nothing to acknowledge")],
+    ["Acknowledged", doneBy(acknowledgement) ?? (occurrences ? "not yet" : NONE)],
     ["Cleared", doneBy(fault.cleared) ?? "never"],
     ...recoveryFacts(fault),
     ["Last change", dateTime(fault.changed_at)],
@@ -43,7 +43,7 @@ function occurrenceFacts(
 function settingsFacts({ asset, last_occurrence }: FaultEntry, isPrinted: boolean): Fact[] {
   if (!last_occurrence) return [];
   const { calibration_id, settings_id } = last_occurrence;
-  const checksums = (
+  const hashes = (
     <>
       settings <code>{settings_id}</code>
       {calibration_id && (
@@ -55,21 +55,21 @@ function settingsFacts({ asset, last_occurrence }: FaultEntry, isPrinted: boolea
   );
   return [
     [
-      "Judged with",
+      "Calibration",
       calibration_id ? (
-        <Link to={calibrationsPath(asset)}>a calibration of this rig</Link>
+        <Link to={calibrationsPath(asset)}>one of this rig</Link>
       ) : (
-        "no calibration: the rig was not learnt"
+        "none: the rig was not calibrated"
       ),
     ],
     [
-      "Checksums",
+      "Hashes",
       isPrinted ? (
-        checksums
+        hashes
       ) : (
         <details>
           <summary>of the settings{calibration_id && " and the calibration"}</summary>
-          {checksums}
+          {hashes}
         </details>
       ),
     ],

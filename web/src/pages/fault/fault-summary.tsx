@@ -15,7 +15,7 @@ const latestFailure = (history: HistoryEntry[]) =>
 function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
   const began = fault.last_occurrence && sinceText(fault.last_occurrence.noted_at);
   if (isFailing(fault)) {
-    if (fault.session_open && isTested(fault)) return `It fails now${began ? `, since ${began}` : ""}.`;
+    if (fault.session_open && isTested(fault)) return `Failing${began ? ` since ${began}` : ""}.`;
     const last = `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}.`;
     return `${last} ${fault.session_open ? "It has not been tested in the open session yet." : "No session is open."}`;
   }
@@ -29,7 +29,9 @@ export function FaultSummary({ fault, history }: { fault: FaultEntry; history: H
   const { code, kind, status } = fault;
   if (isActive(fault)) {
     const failure = latestFailure(history);
-    const seen = failure ? sentence(failure.summary) : `${capitalised(faultMeaning(code, kind))}.`;
+    const seen = failure
+      ? sentence(failure.summary)
+      : `${capitalised(faultMeaning(code, kind, !isFailing(fault)))}.`;
     return (
       <div>
         <p class="sentence">{seen}</p>

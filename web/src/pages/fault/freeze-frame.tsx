@@ -17,8 +17,8 @@ export function FreezeFrame({ evidence, moment: { data, error } }: Props) {
     <section class="card">
       <h2>Freeze frame</h2>
       <p class="quiet small-text">
-        The evidence at the first failure of the last occurrence. What speaks for a fault is red: a residual
-        beyond its limit, or a path that deviates more than a healthy one.{" "}
+        The evidence at the first failure of the last occurrence. Values that indicate a fault are red: a
+        residual beyond its limit, or a path that deviates more than a healthy one.{" "}
         {!isLoading && decisiveNats(thresholds)}
       </p>
       <EvidenceTable evidence={evidence} thresholds={thresholds} />

@@ -16,7 +16,7 @@ function sessionText({ monitor, session_open }: FaultEntry): string {
 function ratioText(use: FaultEntry["in_use"]): string {
   if (use?.ratio == null) return "no session with enough data has ended yet";
   const sessions = `${plural(use.cycles_with_data, "session")} with enough data`;
-  return `${Math.round(use.ratio * 100)} %: able to judge in ${use.cycles_judged} of ${sessions}`;
+  return `in ${use.cycles_judged} of ${sessions} (${Math.round(use.ratio * 100)} %)`;
 }
 
 /** The state of the test, and how often the monitor was able to judge. */
@@ -31,13 +31,12 @@ export function MonitorCard({ fault }: { fault: FaultEntry }) {
         facts={[
           ["In this session", sessionText(fault)],
           ...(counter ? [["Fault detection counter", counter] satisfies [string, string]] : []),
-          ["Able to judge", ratioText(in_use)],
+          ["Tested", ratioText(in_use)],
         ]}
       />
       {ratio != null && ratio < LOW_RATIO && (
         <p class="note">
-          It was rarely able to judge: the rig moves too little, or the conditions for a test are too strict
-          for it.
+          It is rarely tested: the rig moves too little, or the conditions for a test are too strict for it.
         </p>
       )}
       <details class="quiet small-text">

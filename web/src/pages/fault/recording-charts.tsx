@@ -17,7 +17,7 @@ const HEIGHT = 150;
 function marksOf({ onset_s, failed_s, confirmed_s }: FaultRecording): Mark[] {
   const marks: Mark[] = [];
   if (onset_s != null) marks.push({ t: onset_s, label: "onset", colour: "ink" });
-  marks.push({ t: failed_s, label: "pending", colour: "warn" });
+  marks.push({ t: failed_s, label: "suspected", colour: "warn" });
   if (confirmed_s != null) marks.push({ t: confirmed_s, label: "confirmed", colour: "bad" });
   return marks;
 }

@@ -6,7 +6,7 @@ import { isRepair } from "../../words/fault-state";
 import { seconds } from "../../words/numbers";
 
 const EVENT: Record<HistoryEvent, string> = {
-  pending: "became pending",
+  pending: "was suspected",
   confirmed: "was confirmed",
   healed: "healed",
   cleared: "was cleared",

@@ -15,8 +15,7 @@ const timeOfDay = (moment: Date) => moment.toLocaleTimeString(undefined, { timeS
 
 /** What an event tells, and the view that shows more of it. */
 function told(line: ReceivedEvent) {
-  if (isCommunication(line))
-    return { ...communicationText(line), title: "Communication", path: rigPath(line.asset) };
+  if (isCommunication(line)) return { ...communicationText(line), title: "Data", path: rigPath(line.asset) };
   const at = line.t_s == null ? "" : ` At ${seconds(line.t_s)} of ${line.session}.`;
   return {
     ...changeOf(line),
@@ -46,7 +45,7 @@ export function EventFeed({ lines }: { lines: ReceivedEvent[] }) {
   return (
     <section class={`feed${lines.length ? "" : " none"}`} aria-label="Events">
       <h2>Events since the page was opened</h2>
-      {lines.length === 0 && <p class="quiet">Nothing has happened since. New events appear here at once.</p>}
+      {lines.length === 0 && <p class="quiet">No events yet. New ones appear here at once.</p>}
       <ol aria-live="polite">
         {lines.slice(0, SHOWN).map((line) => (
           <Event key={line.event} line={line} />

@@ -16,12 +16,12 @@ const LATE_S = 2;
 /** Note beside the name of a rig that is not learnt. */
 const NOT_LEARNT: Record<LearningState, { word: string; meaning: string }> = {
   gathering: {
-    word: "not learnt",
-    meaning: "Learnt automatically after enough motion; until then, only sensor faults are confirmed",
+    word: "not calibrated",
+    meaning: "Calibrated automatically after enough motion; until then, only sensor faults are confirmed",
   },
-  learning: { word: "being learnt", meaning: "There is enough motion; the calibration is running" },
+  learning: { word: "calibrating", meaning: "There is enough motion; the calibration is running" },
   offered: {
-    word: "was it healthy?",
+    word: "confirm calibration",
     meaning: "A calibration is ready: confirm that the rig was healthy",
   },
   learnt: { word: "", meaning: "" },
@@ -61,7 +61,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           class={`chip ${isMuted ? "chip-muted" : "chip-failing"}`}
           title={`Last data: ${dateTime(entry.communication_lost_since)}`}
         >
-          <b>Communication lost</b> since {sinceText(entry.communication_lost_since)}
+          <b>No data</b> since {sinceText(entry.communication_lost_since)}
         </span>
       )}
       {entry.muted?.map((mute) => (
@@ -69,9 +69,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
           class="chip chip-muted"
           title={`Muted by ${mute.by} until ${dateTime(mute.until)}: ${mute.reason}`}
         >
-          {mute.code === COMMUNICATION
-            ? "lost communication muted"
-            : `${alarmCodeTitle(mute.code)} not tested`}
+          {mute.code === COMMUNICATION ? "“No data” muted" : `${alarmCodeTitle(mute.code)} not tested`}
         </span>
       ))}
       {entry.stale && (

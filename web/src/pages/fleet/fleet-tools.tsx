@@ -11,9 +11,9 @@ const FILTERS: { key: HealthFilter; word: string }[] = [
   { key: "recorded", word: "On record" },
   { key: "drift", word: "Drifting" },
   { key: "untested", word: "Not tested" },
-  { key: "unlearnt", word: "Not learnt" },
+  { key: "unlearnt", word: "Not calibrated" },
   { key: "ok", word: "No fault" },
-  { key: "silent", word: "Silent" },
+  { key: "silent", word: "No data" },
   { key: "idle", word: "No session" },
 ];
 
@@ -52,7 +52,7 @@ export function FleetTools({ view }: { view: FleetView }) {
         change={(key) => change("sort", key)}
       />
       <button type="button" onClick={() => change("layout", layout === "wall" ? "" : "wall")}>
-        {layout === "wall" ? "Show as a list" : "Show for a wall screen"}
+        {layout === "wall" ? "List view" : "Wall view"}
       </button>
     </div>
   );

@@ -36,7 +36,7 @@ export function ImportForm({ file, inspection, inspecting, rigRate, ...props }: 
       {isText && !hasTime && <RateField rate={rate} setRate={setRate} />}
       {isText && inspection.mapping !== "" && (
         <label>
-          <input type="checkbox" checked={isKept} onChange={(e) => setKept(e.currentTarget.checked)} /> Keep
+          <input type="checkbox" checked={isKept} onChange={(e) => setKept(e.currentTarget.checked)} /> Save
           this mapping for further files
         </label>
       )}

@@ -35,8 +35,8 @@ export function ImportTarget({ assets, asset, setAsset, session, setSession }: P
       {!assets.includes(asset) && asset && (
         <p class="note">
           There is no rig <b>{asset}</b> yet. It will be registered with default dimensions (
-          {DEFAULT_DIMENSIONS}), and servo faults cannot be confirmed until it has been learnt. Set it up
-          first if its dimensions differ.
+          {DEFAULT_DIMENSIONS}), and servo faults cannot be confirmed until it is calibrated. Set it up first
+          if its dimensions differ.
         </p>
       )}
     </>

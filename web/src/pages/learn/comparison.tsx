@@ -4,7 +4,7 @@ import type { Profile, Session, Trace } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
 import { useQuery } from "../../hooks/use-query";
 import { ErrorMessage } from "../../parts/error-message";
-import { seconds } from "../../words/numbers";
+import { number, seconds } from "../../words/numbers";
 import { duration } from "../../words/time";
 import { healthyStretch, type HealthyStretch } from "./healthy-stretch";
 import { JudgedByProfile } from "./judged-by-profile";
@@ -37,10 +37,8 @@ function Stretch({ session, stretch }: { session: Session; stretch: HealthyStret
   return (
     <>
       <p class="quiet small-text">
-        {duration(to_s - from_s)} along x without a fault, from {seconds(from_s, 1)} to {seconds(to_s, 1)}
-        {fault_s === undefined
-          ? "; none follows."
-          : `; the next fault of this session begins at ${seconds(fault_s, 1)}, after it.`}
+        {number(from_s, 1)}–{seconds(to_s, 1)} along x ({duration(to_s - from_s)} without a fault),{" "}
+        {fault_s === undefined ? "no later fault." : `next fault at ${seconds(fault_s, 1)}.`}
       </p>
       <ErrorMessage error={error} retry={refetch} />
       <div class="pair">

@@ -37,9 +37,9 @@ export function faultsByCode(ids: string[]): Map<string, DemoFault[]> {
   return groups;
 }
 
-/** Returns the faults as text: X servo, dead; Position sensor, noise. */
+/** Returns the faults as text: X servo (dead), Position sensor (noise). */
 export const faultList = (ids: string[]) =>
   ids
     .map(parse)
-    .map(({ code, effect }) => `${codeTitle(code)}, ${effectWord(effect)}`)
-    .join("; ");
+    .map(({ code, effect }) => `${codeTitle(code)} (${effectWord(effect)})`)
+    .join(", ");

@@ -87,8 +87,7 @@ export function DemoGains() {
       <p class="quiet small-text">
         The commanded angle is Kp times the distance of the ball to where it should be, plus Ki times its
         integral, minus Kd times the velocity. With half the Kd, or five times the Ki, the ball oscillates and
-        no fault is raised, because the rig obeys its controller. A ball that beats against the rim all the
-        time is hardly judged, because a bounce is no motion that a servo has asked for.
+        no fault is raised, because the rig obeys its controller. Bounces off the rim are not tested.
       </p>
     </>
   );

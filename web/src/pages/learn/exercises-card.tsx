@@ -14,9 +14,7 @@ export function ExercisesCard() {
   return (
     <section class="card">
       <h2>Exercises</h2>
-      <p class="quiet">
-        The three applications of the book&rsquo;s chapter. The sessions are those of this service.
-      </p>
+      <p class="quiet">The three applications of the book&rsquo;s chapter.</p>
       {EXERCISES.map((exercise) => (
         <ExerciseText key={exercise.title} exercise={exercise} session={data && sessionFor(exercise, data)} />
       ))}

@@ -30,16 +30,13 @@ export function JudgedFacts({ session, profile, trace }: Props) {
       Run on the whole session
     </ActionButton>
   );
-  const whole = result ? verdict(result.summary).text : replay ? "running…" : judgeAll;
+  const whole = result ? verdict(result.summary, [], profile).text : replay ? "running…" : judgeAll;
   return (
     <Facts
       facts={[
         ["Beyond the limit", percent(shares?.beyond)],
-        ["Time under test", percent(shares?.judged)],
-        [
-          "Beyond the limit while under test",
-          isGateClosed ? "never under test" : percent(shares?.beyondOfJudged),
-        ],
+        ["Time judged", percent(shares?.judged)],
+        ["Beyond the limit while judged", isGateClosed ? "never judged" : percent(shares?.beyondOfJudged)],
         ["Whole session", whole],
         ["Alarms in the whole session", result ? count(result.faults.filter(isAlarm).length) : NONE],
       ]}

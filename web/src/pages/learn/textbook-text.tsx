@@ -5,8 +5,7 @@ export const TextbookText = () => (
     measured and the simulated acceleration differ by 0.01 m/s². That works in a simulation without noise. The
     positions of a real camera have errors of a fraction of a millimetre; differentiated twice, they always
     exceed that limit by far. Below, a stretch without a fault is judged with both profiles: <b>default</b>,
-    whose limit follows from the noise and which waits until a deviation lasts, and <b>textbook</b>, the rule
-    to the letter: it judges only while the command exceeds 4.6° or the acceleration 0.5 m/s², and then raises
-    an alarm at once.
+    with a limit set from the noise and a debounce, and <b>textbook</b>, the rule to the letter: it judges
+    only while the command exceeds 4.6° or the acceleration 0.5 m/s², and then raises an alarm at once.
   </p>
 );

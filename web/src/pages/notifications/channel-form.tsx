@@ -46,7 +46,7 @@ export function ChannelForm({ channel, made }: Props) {
       </div>
       {kind === "webhook" && (
         <p class="quiet">
-          Each message is posted as a CloudEvent (JSON). It is signed as Standard Webhooks say; the key{" "}
+          Each message is posted as a CloudEvent (JSON), signed per Standard Webhooks; the signing key{" "}
           {channel ? "stays as it is." : "is shown once."}
         </p>
       )}

@@ -23,7 +23,7 @@ export function ChannelRow({ channel, refetch }: { channel: Channel; refetch: ()
       <td class="n" data-word="waiting">
         {pending}
       </td>
-      <td class={`n${given_up ? " bad" : ""}`} data-word="given up">
+      <td class={`n${given_up ? " bad" : ""}`} data-word="failed">
         {given_up}
       </td>
       <td>

@@ -15,7 +15,7 @@ export function ChannelTable({ channels, refetch }: Props) {
             <th>Name</th>
             <th>Sends to</th>
             <th class="n">Waiting</th>
-            <th class="n">Given up</th>
+            <th class="n">Failed</th>
             <th>Actions</th>
           </tr>
         </thead>

@@ -25,7 +25,7 @@ export function ChannelsCard({
       {secret && (
         <p class="note" role="status">
           <span>
-            The key of the signature, shown only now: <code class="secret">{secret}</code>
+            Signing key (shown once): <code class="secret">{secret}</code>
           </span>
         </p>
       )}

@@ -6,8 +6,8 @@ import { timeAgo, dateTime } from "../../words/time";
 /** The state of a delivery, and the class of its look. */
 function stateOf({ state, attempts }: Delivery): { text: string; look: string } {
   if (state === "delivered") return { text: "delivered", look: "status-ok" };
-  if (state === "given_up") return { text: "given up", look: "status-confirmed" };
-  return attempts ? { text: "tried again", look: "status-pending" } : { text: "waiting", look: "quiet" };
+  if (state === "given_up") return { text: "failed", look: "status-confirmed" };
+  return attempts ? { text: "retrying", look: "status-pending" } : { text: "waiting", look: "quiet" };
 }
 
 export function DeliveriesCard({ deliveries }: { deliveries: Delivery[] }) {

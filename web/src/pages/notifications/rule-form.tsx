@@ -24,7 +24,7 @@ export function RuleForm({ channels, made }: { channels: Channel[]; made: () => 
         change={(codes) => change({ codes })}
       />
       <CheckGroup
-        legend="Told when a fault"
+        legend="Notify when a fault is"
         options={Object.keys(CHANGES) as AlarmChange[]}
         word={(option) => CHANGES[option]}
         chosen={draft.changes}

@@ -4,8 +4,8 @@ import { ConfirmButton } from "../../parts/confirm-button";
 import { alarmCodeTitle, CHANGES } from "../../words/alarm";
 import { dateTime, duration } from "../../words/time";
 
-/** Hours for which a rule is silenced by its button. */
-const SILENCE_H = 8;
+/** Hours for which a rule is muted by its button. */
+const MUTE_H = 8;
 
 /** The settings of a rule: every one, so that a change of one keeps the others. */
 function settingsOf(rule: Rule): { [Key in keyof Required<NewRule>]: NewRule[Key] } {
@@ -28,7 +28,7 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
       <th scope="row">
         {rule.name}
         {!rule.enabled && <span class="quiet"> (off)</span>}
-        {isSilent(rule) && <p class="quiet small-text">silent until {dateTime(rule.silent_until)}</p>}
+        {isSilent(rule) && <p class="quiet small-text">muted until {dateTime(rule.silent_until)}</p>}
       </th>
       <td data-word="rigs">
         {rule.asset === "*" ? "all" : rule.asset}
@@ -49,8 +49,8 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
 }
 
 function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
-  const isSilenced = isSilent(rule);
-  const silenceEnd = () => new Date(Date.now() + SILENCE_H * 3_600_000).toISOString();
+  const isMuted = isSilent(rule);
+  const muteEnd = () => new Date(Date.now() + MUTE_H * 3_600_000).toISOString();
   const change = (more: Partial<NewRule>) => async () => {
     await alarmApi.putRule(rule.id, { ...settingsOf(rule), ...more });
     await refetch();
@@ -64,8 +64,8 @@ function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
       <ActionButton class="small" action={change({ enabled: !rule.enabled })}>
         {rule.enabled ? "Turn off" : "Turn on"}
       </ActionButton>{" "}
-      <ActionButton class="small" action={change({ silent_until: isSilenced ? null : silenceEnd() })}>
-        {isSilenced ? "End the silence" : `Silence ${SILENCE_H} h`}
+      <ActionButton class="small" action={change({ silent_until: isMuted ? null : muteEnd() })}>
+        {isMuted ? "Unmute" : `Mute ${MUTE_H} h`}
       </ActionButton>{" "}
       <ConfirmButton
         class="small"
@@ -74,8 +74,8 @@ function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
         question={`Delete the rule ${rule.name}?`}
         action={remove}
       >
-        Nobody is told any more of what only this rule selects. To be left alone for a while, silence it or
-        turn it off instead.
+        No notifications are sent any more of what only this rule selects. To pause it, mute it or turn it off
+        instead.
       </ConfirmButton>
     </>
   );

@@ -20,7 +20,7 @@ export function RulesCard({ rules, channels, refetch }: Props) {
   return (
     <section class="card">
       <h2>Rules</h2>
-      {!rules.length && <p class="quiet">No rule yet: nobody is told of anything.</p>}
+      {!rules.length && <p class="quiet">No rules yet: no notifications are sent.</p>}
       {rules.length > 0 && (
         <div class="scroll">
           <table class="list alarms">
@@ -28,7 +28,7 @@ export function RulesCard({ rules, channels, refetch }: Props) {
               <tr>
                 <th>Name</th>
                 <th>Rigs</th>
-                <th>Told of</th>
+                <th>Notifies of</th>
                 <th>Channel</th>
                 <th>Repeated</th>
                 {channels && <th>Actions</th>}

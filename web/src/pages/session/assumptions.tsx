@@ -15,10 +15,10 @@ export function Assumptions({ session, asset }: { session: Session; asset: Asset
   const isDefault = hasDefaultDimensions(asset);
   return (
     <p class="note small-text">
-      <b>Not learnt.</b> Judged without a calibration, with {isDefault ? "the default" : "these"} dimensions:{" "}
-      {dimensions(asset)}. Only sensor faults can be confirmed.{" "}
+      <b>Not calibrated.</b> Judged without a calibration, with {isDefault ? "the default" : "these"}{" "}
+      dimensions: {dimensions(asset)}. Only sensor faults can be confirmed.{" "}
       <Link to={setUpPath(asset.name, isDefault ? "describe" : "learn")}>
-        {isDefault ? "Enter the dimensions of this rig" : "Learn this rig"}
+        {isDefault ? "Enter the dimensions of this rig" : "Calibrate this rig"}
       </Link>
     </p>
   );

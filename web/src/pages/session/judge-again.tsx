@@ -23,7 +23,9 @@ export function JudgeAgain({ session }: { session: Session }) {
           {replay.error}
         </p>
       )}
-      {replay?.result && <ReplayVerdict session={session} result={replay.result} />}
+      {replay?.result && (
+        <ReplayVerdict session={session} result={replay.result} profile={replay.settings.profile} />
+      )}
     </section>
   );
 }

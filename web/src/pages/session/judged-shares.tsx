@@ -1,8 +1,8 @@
 import type { JudgedMonitor } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
-import { judgedShare } from "../../words/verdict";
+import { judgedShare, resultText } from "../../words/verdict";
 
-/** The part of the session that each monitor judged, and its outcome. */
+/** The part of the session that each monitor judged, and its result. */
 export function JudgedShares({ monitors }: { monitors: JudgedMonitor[] }) {
   if (monitors.length === 0) return null;
   return (
@@ -14,7 +14,7 @@ export function JudgedShares({ monitors }: { monitors: JudgedMonitor[] }) {
           <th scope="col" class="n">
             Judged
           </th>
-          <th scope="col">Outcome</th>
+          <th scope="col">Result</th>
         </tr>
       </thead>
       <tbody>
@@ -22,7 +22,7 @@ export function JudgedShares({ monitors }: { monitors: JudgedMonitor[] }) {
           <tr>
             <th scope="row">{codeTitle(monitor.code)}</th>
             <td class="n">{judgedShare(monitor)}</td>
-            <td>{monitor.outcome}</td>
+            <td>{resultText(monitor.outcome)}</td>
           </tr>
         ))}
       </tbody>

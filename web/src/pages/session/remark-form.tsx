@@ -11,7 +11,7 @@ interface Props {
   refetch: () => Promise<unknown>;
 }
 
-/** Keeps a remark on the current moment, or on the range that was zoomed to. */
+/** Adds a remark on the current moment, or on the range that was zoomed to. */
 export function RemarkForm({ session, place, isZoomed, refetch }: Props) {
   const actor = useActor();
   const [text, setText] = useState("");
@@ -29,7 +29,7 @@ export function RemarkForm({ session, place, isZoomed, refetch }: Props) {
       </label>
       <ActorField actor={actor} />{" "}
       <ActionButton class="small" action={keep} disabled={!text.trim()} needs="operator">
-        {isZoomed ? "Keep for the shown range" : "Keep for this moment"}
+        {isZoomed ? "Add remark on the shown range" : "Add remark at this moment"}
       </ActionButton>
     </div>
   );

@@ -1,22 +1,25 @@
 import type { Replay, Session } from "../../api/types";
 import { Facts } from "../../parts/facts";
-import { count } from "../../words/numbers";
+import { plural } from "../../words/numbers";
 import { verdict } from "../../words/verdict";
 import { Differences } from "./differences";
 import { Hash } from "./hash";
 
-type Result = NonNullable<Replay["result"]>;
+interface Props {
+  session: Session;
+  result: NonNullable<Replay["result"]>;
+  /** The profile that was asked for, if not that of the session. */
+  profile?: string | null;
+}
 
 /** The recorded verdict and that of the replay. */
-export function ReplayVerdict({ session, result }: { session: Session; result: Result }) {
+export function ReplayVerdict({ session, result, profile }: Props) {
   const { same, differences, recorded_hash, summary } = result;
   const recorded = session.verdict ? verdict(session.verdict).text : "when the session has ended";
   return (
     <div class="verdicts">
       <p role="status" class={same ? "status-ok" : "status-pending"}>
-        {same
-          ? "The same verdict, transition by transition."
-          : `Another verdict: ${count(differences.length)} differences.`}
+        {same ? "Identical verdict." : `Different verdict: ${plural(differences.length, "change")}.`}
       </p>
       <div class="pair">
         <Facts
@@ -27,7 +30,7 @@ export function ReplayVerdict({ session, result }: { session: Session; result: R
         />
         <Facts
           facts={[
-            ["Judged again", verdict(summary).text],
+            ["Judged again", verdict(summary, [], profile).text],
             ["Verdict hash", <Hash hash={summary.verdict_hash} />],
           ]}
         />

@@ -19,8 +19,8 @@ export function TrialCard({ thresholds, settings, choose, state: { trial, error 
     <section class="card">
       <h2>Try other limits</h2>
       <p class="quiet">
-        Counts the alarms that other limits and debounce times would raise on this session, judged by itself,
-        and marks them in the charts. Nothing is stored.
+        Counts the alarms that other limits and debounce times would raise on this session on its own,
+        ignoring earlier sessions, and marks them in the charts. Nothing is stored.
       </p>
       <div class="scroll" tabIndex={0} role="region" aria-label="Limits and debounce times">
         <table class="trial">

@@ -1,5 +1,6 @@
 import { useRef } from "preact/hooks";
 import { FORMATS, type FormatName } from "../../api/formats";
+import { useRefusal } from "../../parts/login/rights";
 import { useFeature } from "../../parts/service-health";
 import { useFileDrop, type Dropped } from "./use-file-drop";
 
@@ -21,6 +22,7 @@ const oneOf = (words: string[]) =>
 export function DropZone({ take }: { take: (dropped: Dropped) => void }) {
   const isOver = useFileDrop(take);
   const isBuilt = useFeature();
+  const refused = useRefusal("operator");
   const read = SUFFIXES.filter(([format]) => isBuilt(FORMATS[format].feature));
   const words = oneOf(read.map(([format]) => FORMATS[format].word));
   const input = useRef<HTMLInputElement>(null);
@@ -43,7 +45,12 @@ export function DropZone({ take }: { take: (dropped: Dropped) => void }) {
       />
       <span>{isOver ? "Release to import" : `Drop a recording here (${words}), or`}</span>{" "}
       {!isOver && (
-        <button type="button" onClick={() => input.current?.click()}>
+        <button
+          type="button"
+          disabled={refused !== undefined}
+          title={refused}
+          onClick={() => input.current?.click()}
+        >
           choose a file
         </button>
       )}

@@ -7,8 +7,8 @@ import type { SessionKey } from "./session-filter";
 
 const VERDICTS = [
   ["", "Any"],
-  ["fault", "A fault confirmed"],
-  ["no_fault", "No fault confirmed"],
+  ["fault", "Fault"],
+  ["no_fault", "No fault"],
 ] as const;
 
 const SORTS = [

@@ -11,10 +11,10 @@ import { useWatchedRig } from "./use-watched-rig";
 const TOKEN_PLACEHOLDER = "offbd_TOKEN";
 
 const LOCAL = /localhost|127\.0\.0\.1/;
-const LOCAL_NOTE =
-  " A device on the network needs the name or address of this computer instead of 127.0.0.1, " +
-  "and the service must listen on it (--listen 0.0.0.0:8087). Then it requires a token of everyone: make the first " +
-  "one with “offbd token create”.";
+const localNote = ({ hostname, port }: Location) =>
+  ` A device on the network needs the name or address of this computer instead of ${hostname}, ` +
+  `and the service must listen on it (--listen 0.0.0.0:${port || 80}). Then it requires a token of everyone: create ` +
+  "the first one with “offbd token create”.";
 
 /** Snippets for sending samples, and whether samples arrive. */
 export function Connect({ asset, next }: { asset: Asset; next: () => void }) {
@@ -47,7 +47,7 @@ export function Connect({ asset, next }: { asset: Asset; next: () => void }) {
       </CodeBlock>
       <p class="quiet small-text">
         <DeviceToken asset={name} created={setToken} />
-        {LOCAL.test(location.hostname) && LOCAL_NOTE}
+        {LOCAL.test(location.hostname) && localNote(location)}
       </p>
       <SamplesStatus state={hasSent ? state : undefined} isSending={isSending} />
       <div class="form-end">

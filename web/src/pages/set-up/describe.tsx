@@ -40,7 +40,7 @@ export function Describe({ asset, done }: Props) {
   return (
     <form class="card" onSubmit={submit}>
       <p>
-        Measure the ball and the plate and enter them here: verdicts depend on them. The service learns the
+        Measure the ball and the plate and enter them here: verdicts depend on them. The calibration finds the
         rest.
       </p>
       <NameFields {...fields} isRegistered={asset !== undefined} />

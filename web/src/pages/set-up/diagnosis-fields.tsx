@@ -22,16 +22,15 @@ export function DiagnosisFields(fields: FieldsProps) {
       <OptionalNumber
         {...fields}
         field="falseAlarms"
-        label="Accepted false alarms per year"
+        label="Accepted false servo alarms per rig and year"
         min={LEAST_ALARMS}
         max={MOST_ALARMS}
       >
-        How often a healthy rig that always runs may be accused of a servo fault, up to a million times a
-        year. Fewer false alarms need more evidence: faults are found later, and small ones not at all. Empty:
-        about 26 a year. This is for the servos alone; ball and sensor have tests of their own, and what is
-        expected of each is shown after learning.
+        For a healthy rig that always runs; at most a million. Fewer false alarms need more evidence: faults
+        are found later, and small ones not at all. Empty: about 26 a year. This is for the servos alone; ball
+        and sensor have tests of their own, and what is expected of each is shown after the calibration.
       </OptionalNumber>
-      <p class="quiet small-text">An open session keeps the settings that it began with.</p>
+      <p class="quiet small-text">Applies from the next session.</p>
     </details>
   );
 }

@@ -11,12 +11,12 @@ export function FalseAlarms({ certificate }: { certificate: MonitorCertificate[]
       <table class="numbers">
         <thead>
           <tr>
-            <th scope="col">Tested on recordings not learnt from</th>
+            <th scope="col">Tested on held-out recordings</th>
             <th scope="col" class="n">
               Judged
             </th>
             <th scope="col" class="n">
-              Closest to an alarm
+              Closest to the limit
             </th>
             <th scope="col" class="n">
               False alarms

@@ -49,13 +49,13 @@ export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise
         {chosen.size > 0 && <LengthStatus seconds={totalLength(sessions ?? [], chosen)} />}
         {hasOpen && (
           <p class="note small-text">
-            A chosen session is still being recorded: learning ends it. A rig that goes on sending opens a new
-            one.
+            A chosen session is still being recorded: the calibration ends it. A rig that goes on sending
+            opens a new one.
           </p>
         )}
         <div class="form-end">
           <ActionButton class="primary" action={learn} disabled={chosen.size === 0} needs="operator">
-            {hasOpen ? "End the recording and learn" : `Learn from ${chosen.size === 1 ? "it" : "them"}`}
+            {hasOpen ? "End the recording and calibrate" : "Calibrate"}
           </ActionButton>
         </div>
       </section>

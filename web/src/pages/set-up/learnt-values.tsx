@@ -7,7 +7,7 @@ const milliseconds = (s: number) => number(s * 1e3, 0, "ms");
 const ROWS: AxisRow<AxisCalibration>[] = [
   ["Gain: measured over modelled acceleration", (axis) => number(axis.gain, 3)],
   ["Dead time of the servo", (axis) => milliseconds(axis.dead_time_s)],
-  ["Lag of the servo", (axis) => milliseconds(axis.lag_s)],
+  ["Time constant of the servo", (axis) => milliseconds(axis.lag_s)],
   ["Plate angle at command 0", (axis) => degrees(axis.level_rad, 2)],
   ["Noise of the readings", (axis) => millimetres(axis.noise_m, 2)],
   [

@@ -11,10 +11,10 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
   const { calibration } = asset;
   return (
     <section class="card">
-      <h2>What was learnt</h2>
+      <h2>Calibration</h2>
       {job && !isFinished(job) && (
         <p role="status">
-          <span class="spinner" aria-hidden="true" /> {jobText(job, "Learning")}
+          <span class="spinner" aria-hidden="true" /> {jobText(job, "Calibrating")}
         </p>
       )}
       {job?.state === "failed" && (
@@ -24,7 +24,7 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
       )}
       {job?.state === "done" && (
         <p class="wait wait-good" role="status">
-          <b>Learnt.</b> The next session is judged by it.
+          <b>Calibrated.</b> Used from the next session on.
         </p>
       )}
       {!calibration && !job && <NothingLearnt asset={asset.name} />}

@@ -14,6 +14,7 @@ export function NameFields({ isRegistered, ...fields }: FieldsProps & { isRegist
             disabled={isRegistered}
             required
             pattern="[A-Za-z0-9._\-]+"
+            title="Letters, digits, “-”, “_” and “.”"
             maxLength={128}
             placeholder="bench-1"
             onInput={(e) => set({ name: e.currentTarget.value })}

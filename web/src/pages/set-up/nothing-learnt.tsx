@@ -12,9 +12,8 @@ export function NothingLearnt({ asset }: { asset: string }) {
   if (learning?.state === "offered")
     return (
       <p class="wait wait-good" role="status">
-        <b>A calibration is ready,</b> learnt from the motion of the rig itself. It is used once you have
-        answered whether the rig was healthy meanwhile.{" "}
-        <Link to={rigPath(asset)}>Answer on the page of the rig</Link>
+        <b>A calibration is ready,</b> from the motion of the rig itself. Confirm that the rig was healthy to
+        start using it. <Link to={rigPath(asset)}>Confirm on the page of the rig</Link>
       </p>
     );
   if (learning?.state === "learning")
@@ -23,5 +22,5 @@ export function NothingLearnt({ asset }: { asset: string }) {
         <span class="spinner" aria-hidden="true" /> {learning.summary}
       </p>
     );
-  return <p class="quiet">Nothing yet. Until then, only sensor faults are confirmed.</p>;
+  return <p class="quiet">None yet. Until then, only sensor faults are confirmed.</p>;
 }

@@ -11,7 +11,7 @@ const FIELDS: Record<string, { label: string; unit: string; factor: number }> = 
   "/plate/width_m": { label: "Width along y", unit: "mm", factor: 1e3 },
   "/plate/diameter_m": { label: "Diameter", unit: "mm", factor: 1e3 },
   "/diagnostics/debounce_s": { label: "Debounce time", unit: "s", factor: 1 },
-  "/diagnostics/false_alarms_per_rig_year": { label: "Accepted false alarms", unit: "", factor: 1 },
+  "/diagnostics/false_alarms_per_rig_year": { label: "Accepted false servo alarms", unit: "", factor: 1 },
   "/servo/angle_limit_rad": { label: "Largest plate angle", unit: "°", factor: 180 / Math.PI },
 };
 

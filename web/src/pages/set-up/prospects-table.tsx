@@ -36,7 +36,7 @@ export function ProspectsTable({ prospects }: { prospects: Prospects }) {
         ))}
       </AxisTable>
       <p class="quiet">
-        Each fault was injected into the sessions used for learning, at {trials} times. With more motion,
+        Each fault was injected into the sessions of the calibration, at {trials} times. With more motion,
         smaller faults are detected, and earlier.
       </p>
     </>

@@ -59,7 +59,7 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
       </p>
       <div class="form-end">
         <button type="button" class={agrees ? "primary" : ""} onClick={next}>
-          {agrees ? "Continue: learn the rig" : "Continue anyway"}
+          {agrees ? "Continue: calibrate the rig" : "Continue anyway"}
         </button>
       </div>
     </section>

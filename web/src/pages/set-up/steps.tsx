@@ -6,7 +6,7 @@ export const STEPS: { key: SetUpStep; word: string }[] = [
   { key: "describe", word: "Describe" },
   { key: "connect", word: "Connect" },
   { key: "check", word: "Check" },
-  { key: "learn", word: "Learn" },
+  { key: "learn", word: "Calibrate" },
 ];
 
 interface Props {

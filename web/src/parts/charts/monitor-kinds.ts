@@ -38,7 +38,7 @@ const sharedCounter = (of: string, column: SharedColumn): ChartKind => ({
   about: "it rises with the duration of the failure; the test fails at 127 and passes at −128",
 });
 
-const stuckBall = sharedCounter("ball", "stuckBall");
-const sensor = sharedCounter("sensor", "sensor");
+const stuckBall = sharedCounter("stuck ball", "stuckBall");
+const sensor = sharedCounter("position sensor", "sensor");
 
 export const MONITOR_KINDS = { evidence, counter, stuckBall, sensor };

@@ -55,7 +55,7 @@ function ViewsDialog({ page, close }: { page: string; close: () => void }) {
           Save
         </button>
       </form>
-      <p class="quiet small-text">Views are kept in this browser. Their addresses can be sent to others.</p>
+      <p class="quiet small-text">Views are saved in this browser. Their addresses can be sent to others.</p>
     </Dialog>
   );
 }

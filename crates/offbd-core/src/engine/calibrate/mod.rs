@@ -68,7 +68,7 @@ const GAINS: Population =
 pub enum CannotCalibrate {
     #[error("session {session}: {misfit}")]
     Implausible { session: usize, misfit: Misfit },
-    #[error("no axis has both commands and positions: nothing to learn from")]
+    #[error("no axis has both commands and positions: nothing to calibrate from")]
     NoAxis,
     #[error(
         "the recordings last {seconds:.0} s together, and at least {LEAST_S:.0} s are needed: add \
@@ -96,13 +96,13 @@ pub enum CannotCalibrate {
     Reversed { axis: Axis, gain: f64 },
     #[error(
         "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, and neither the \
-         other axis nor the opposite sign clearly does: it is noise, drag, stiction or somebody's hand; \
+         other axis nor the opposite sign clearly does: it is noise, drag, stiction or a push by hand; \
          check the sensor, and that the recording is healthy",
         axis = axis.as_str(), command = axis.command()
     )]
     Unexplained { axis: Axis, percent: f64 },
     #[error(
-        "there is too little data to test what was learnt: nothing can be learnt from {what} alone \
+        "there is too little data to test the calibration: none can be made from {what} alone \
          ({reason}); record twice as long, or several sessions"
     )]
     Untested { what: &'static str, reason: Box<CannotCalibrate> },
@@ -119,7 +119,7 @@ pub enum CannotCalibrate {
     )]
     Sticks { session: usize, n: usize, from_s: f64 },
     #[error(
-        "judged by what the other data taught, session {session} would report {code} at {at_s:.2} s{of_kind}; \
+        "judged by a calibration from the other data, session {session} would report {code} at {at_s:.2} s{of_kind}; \
          leave it out if the rig was not healthy then, or record more sessions",
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
     )]

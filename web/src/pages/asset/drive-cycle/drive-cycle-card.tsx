@@ -16,7 +16,7 @@ export function DriveCycleCard({ asset }: { asset: Asset }) {
         “cannot tell”.
       </p>
       {!asset.calibration && (
-        <p>Neither the servos nor the ball can be tested before the rig has been learnt.</p>
+        <p>Neither the servos nor the ball can be tested before the rig is calibrated.</p>
       )}
       {asset.calibration && !cycle && <ActionButton action={compute}>Compute the drive cycle</ActionButton>}
       {cycle && <DriveCycleDetails cycle={cycle} />}

@@ -5,8 +5,8 @@ import { setUpPath } from "../../../router/paths";
 export function GatheringNote({ name }: { name: string }) {
   return (
     <p class="quiet small-text">
-      Until then, only sensor faults are confirmed. The rig is learnt automatically while it runs, or you can{" "}
-      <Link to={setUpPath(name, "learn")}>choose the recordings yourself</Link>.
+      Until then, only sensor faults are confirmed. The rig is calibrated automatically while it runs, or you
+      can <Link to={setUpPath(name, "learn")}>choose the recordings yourself</Link>.
     </p>
   );
 }

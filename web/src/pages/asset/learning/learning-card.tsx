@@ -9,10 +9,10 @@ import { MotionProgress } from "./motion-progress";
 import { TeachingSessions } from "./teaching-sessions";
 
 const TITLES: Record<LearningState, string> = {
-  gathering: "This rig has not been learnt yet",
-  learning: "Learning",
+  gathering: "This rig is not calibrated yet",
+  learning: "Calibrating",
   offered: "Was the rig healthy while it was recorded?",
-  learnt: "Learnt automatically",
+  learnt: "Calibrated automatically",
 };
 
 /** Polling interval once the rig is learnt, ms; before, every state contains the progress. */
@@ -43,7 +43,7 @@ export function LearningCard({ name, state, changed }: Props) {
   const discard = afterwards(api.discardLearning);
   const isGathering = learning.state === "gathering";
   return (
-    <section class="card learning" aria-label="Learning">
+    <section class="card learning" aria-label="Calibration">
       <h2>{TITLES[learning.state]}</h2>
       <p>{learning.summary}</p>
       {isGathering && <MotionProgress learning={learning} />}
@@ -51,7 +51,7 @@ export function LearningCard({ name, state, changed }: Props) {
       {learning.state === "offered" && (
         <p class="page-tools">
           <ActionButton class="primary" action={afterwards(api.acceptLearning)} needs="operator">
-            Yes, use what was learnt
+            Yes, use this calibration
           </ActionButton>
           <ActionButton action={discard} needs="operator">
             No, start again
