@@ -744,11 +744,11 @@ async fn publish_over_tls(key: &Key, directory: &std::path::Path) -> String {
 
 #[test]
 fn the_operations_manual_contains_the_policy() {
-    let manual = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations.md");
+    let manual = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/operations/security.md");
     let manual = std::fs::read_to_string(manual).unwrap();
     for (right, allowed) in POLICY {
         let words = allowed.map(|allowed| if allowed { "yes" } else { "no" }).join(" | ");
         let row = format!("| {right} | {words} | ");
-        assert!(manual.contains(&row), "docs/operations.md has no row `{row}`");
+        assert!(manual.contains(&row), "docs/operations/security.md has no row `{row}`");
     }
 }

@@ -13,12 +13,21 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 /// Documents outside `docs/` whose paths must exist.
 const DOCUMENTS: [&str; 3] = ["ARCHITECTURE.md", "README.md", "CONTRIBUTING.md"];
 
-/// Returns the documents whose paths must exist: `DOCUMENTS` and those in `docs/`.
+/// The folders of documents.
+const DOCUMENT_FOLDERS: [&str; 2] = ["docs", "docs/operations"];
+
+/// Returns the documents whose paths must exist: `DOCUMENTS` and those in `DOCUMENT_FOLDERS`.
 fn pages() -> Vec<String> {
-    let entries = std::fs::read_dir(Path::new(ROOT).join("docs")).unwrap();
+    let in_folders = DOCUMENT_FOLDERS.into_iter().flat_map(documents_in);
+    DOCUMENTS.map(str::to_owned).into_iter().chain(in_folders).collect()
+}
+
+/// Returns the documents in `folder`, without those in its subfolders.
+fn documents_in(folder: &str) -> Vec<String> {
+    let entries = std::fs::read_dir(Path::new(ROOT).join(folder)).unwrap();
     let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let in_docs = names.filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}"));
-    DOCUMENTS.map(str::to_owned).into_iter().chain(in_docs).collect()
+    let documents = names.filter(|name| name.ends_with(".md"));
+    documents.map(|name| format!("{folder}/{name}")).collect()
 }
 
 /// Names that must not occur in a folder, beyond what the dependencies of its crate forbid: what

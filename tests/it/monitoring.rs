@@ -4,13 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::support::process::Process;
-use crate::support::{batch, rig};
+use crate::support::{batch, manual, rig};
 use serde_json::{Value, json};
 
 const DASHBOARD: &str = include_str!("../../deploy/grafana/offbd.json");
 const RIG_DASHBOARD: &str = include_str!("../../deploy/grafana/offbd-rig.json");
 const ALERTS: &str = include_str!("../../deploy/prometheus/offbd.yaml");
-const MANUAL: &str = include_str!("../../docs/operations.md");
 
 /// Returns the metrics of `/metrics`, each with its labels.
 fn metrics_and_labels(text: &str) -> BTreeMap<String, BTreeSet<String>> {
@@ -95,13 +94,14 @@ async fn every_metric_is_documented_and_no_label_comes_from_a_request() {
         names.insert(name.to_owned());
     }
     assert!(names.len() >= 25, "{names:?}");
+    let manual = manual();
     for name in &names {
-        assert!(MANUAL.contains(&format!("`{name}`")), "docs/operations.md does not name {name}");
+        assert!(manual.contains(&format!("`{name}`")), "docs/operations/ does not name {name}");
     }
     // Claims of a JSON Web Token have the same prefix as metrics.
-    let metrics = uses(MANUAL).into_iter().filter(|(name, _)| !CLAIMS.contains(&name.as_str()));
+    let metrics = uses(&manual).into_iter().filter(|(name, _)| !CLAIMS.contains(&name.as_str()));
     for (name, _) in metrics.filter(|(name, _)| !is_left_out(name)) {
-        assert!(names.contains(&name), "docs/operations.md names {name}, which does not exist");
+        assert!(names.contains(&name), "docs/operations/ names {name}, which does not exist");
     }
     assert!(!text.contains("very-own"), "a label contains a name from a request");
 }

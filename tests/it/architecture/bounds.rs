@@ -1,4 +1,4 @@
-//! Compares the list of bounds in the operations manual with the code.
+//! Compares the lists of bounds and of their keys in the operations manual with the code.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -56,7 +56,7 @@ fn bounds_in_code() -> BTreeSet<String> {
 const STARTS: [&str; 2] = ["`src/", "`crates/"];
 
 fn bounds_in_manual() -> BTreeSet<String> {
-    let manual = read("docs/operations.md");
+    let manual = read("docs/operations/limits.md");
     let rows = manual
         .lines()
         .filter(|line| line.starts_with("| ") && STARTS.iter().any(|s| line.contains(s)));
@@ -81,7 +81,8 @@ fn the_manual_lists_every_bound_of_the_code_with_its_value() {
 
 #[test]
 fn the_manual_lists_every_bound_of_the_configuration() {
-    let (config, manual) = (read("src/config.rs"), read("docs/operations.md"));
+    let config = read("src/config.rs");
+    let manual = read("docs/operations/limits.md") + &read("docs/operations/configuration.md");
     let (_, rest) = config.split_once("pub struct RetentionConfig {").unwrap();
     let (body, _) = rest.split_once("\n}").unwrap();
     let fields =
@@ -89,8 +90,7 @@ fn the_manual_lists_every_bound_of_the_configuration() {
     let retention = fields.map(|field| format!("retention.{field}"));
     let others = SECTIONS.iter().copied().flatten().map(|key| (*key).to_owned());
     for key in others.chain(retention) {
-        let in_table = manual.contains(&format!("`{key}`"));
-        let in_example = manual.contains(&format!("\n{} = ", key.rsplit('.').next().unwrap()));
-        assert!(in_table || in_example, "{key} is not in docs/operations.md");
+        let is_listed = manual.contains(&format!("`{key}`"));
+        assert!(is_listed, "{key} is neither in limits.md nor in configuration.md");
     }
 }

@@ -29,7 +29,7 @@ pub mod web_socket;
 pub mod workbook;
 
 use std::future::Future;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::pin::Pin;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -50,6 +50,15 @@ use sse_stream::{Sse, SseStream};
 /// Longest time to wait for anything; far more than is needed, also by a thread of the lowest
 /// priority beside other tests.
 pub const DEADLINE: Duration = Duration::from_secs(180);
+
+/// Returns the operations manual: all pages in `docs/operations/`, one after the other.
+pub fn manual() -> String {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/operations");
+    let paths = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let is_page = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "md");
+    let pages = paths.filter(is_page).map(|page| std::fs::read_to_string(page).unwrap());
+    pages.collect()
+}
 
 /// A service with its own data directory.
 pub struct ServiceFixture {

@@ -2,7 +2,7 @@
 //!
 //! An adapter: it makes the same requests to the service, under the same rights, as the
 //! interface below `/api/v1`, and names the results differently. A component is a rig. Locks
-//! are not offered, because they would not exclude: see `docs/operations.md`. Nor are areas,
+//! are not offered, because they would not exclude: see `docs/operations/sovd.md`. Nor are areas,
 //! apps, functions, operations, modes and updates.
 
 mod data;
