@@ -69,6 +69,8 @@ test("thousands of rigs can be searched and filtered, and only visible rows are 
     .getByText(/X servo/)
     .waitFor();
   await view.getByRole("button", { name: /^Fault/ }).click();
+  // Once the fault is confirmed; until then it is suspected.
+  await rows.filter({ hasText: "rig-7" }).first().waitFor();
   assert.equal(await rows.filter({ hasText: "rig-7" }).count(), 1);
   assert.deepEqual(view.errors, []);
   await view.done();
