@@ -80,7 +80,7 @@ test("the page of a fault draws what its monitor decided on, and zooms into it",
   await zoom.getByRole("button", { name: "Zoom out" }).click();
   await zoom.waitFor({ state: "detached" });
   await view.getByLabel("Monitor").selectOption({ label: "Position sensor" });
-  await view.getByRole("img", { name: /^Fault detection counter, sensor/ }).waitFor();
+  await view.getByRole("img", { name: /^Fault detection counter, position sensor/ }).waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });
