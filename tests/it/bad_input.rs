@@ -209,7 +209,8 @@ async fn an_import_reports_invalid_rows_and_rejects_other_files() {
     client.post_text(path, "text/csv", csv(&rig(10, 10))).await.problem(409);
     let path = "assets/a/sessions/import";
     client.post_text(path, "text/csv", "nothing,here\n1,2\n").await.problem(400);
-    client.post_text(path, "application/json", "{}").await.problem(415);
+    client.post_text(path, "application/json", "{}").await.problem(400);
+    client.post_text(path, "application/xml", "<a/>").await.problem(415);
     let path = "assets/nobody/sessions/import";
     client.post_text(path, "text/csv", csv(&rig(10, 10))).await.problem(404);
     check_alive(client).await;

@@ -28,8 +28,8 @@ use offbd_terminal::table;
     radians, metres. An empty position means that no ball was seen. For other names \
     and units give --columns; `offbd inspect FILE` proposes it. In a build with the \
     feature `parquet`, Parquet and Arrow files with these columns are read too; with `mcap`, \
-    MCAP files with messages of these keys; with `xlsx`, Excel workbooks. JSON lists are\n\
-    read as texts are.\n\n\
+    MCAP files with messages of these keys; with `xlsx`, Excel workbooks. JSON lists \
+    are read as texts are.\n\n\
     Examples:\n  \
     offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
     offbd replay --asset learnt.json --join data-*.csv\n  \

@@ -158,7 +158,6 @@ pub(super) async fn open(
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
     request_body(content((String = "text/csv"), (BinaryFile = "application/octet-stream"),
-        (serde_json::Value = "application/json"),
         (BinaryFile = "application/vnd.apache.parquet"),
         (BinaryFile = "application/vnd.apache.arrow.stream"),
         (BinaryFile = "application/vnd.mcap"),

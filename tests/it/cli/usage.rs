@@ -61,10 +61,16 @@ fn unusable_input_exits_with_3_and_the_name_of_the_file() {
     cli.write("empty.csv", "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n");
     cli.write("radius.json", r#"{"name":"a","ball":{"radius_m":-1}}"#);
     cli.write("broken.json", "{");
+    for folder in ["bad", "none"] {
+        std::fs::create_dir(cli.path(folder)).unwrap();
+    }
+    cli.write("bad/header.csv", "t_s,x_m\n0,0\n");
+    cli.write("bad/notes.txt", "monday\n");
     cli.ok("simulate --seconds 1 -o good.csv");
     for (line, expected) in [
         ("replay nowhere.csv", vec!["nowhere.csv"]),
-        ("replay .", vec![".: "]),
+        ("replay bad", vec!["bad/header.csv: ", "bad/notes.txt: "]),
+        ("replay none", vec!["none: the folder has no files"]),
         ("replay header.csv", vec!["header.csv", "cmd_qx_rad"]),
         ("replay empty.csv", vec!["empty.csv", "no usable row"]),
         ("replay --asset radius.json good.csv", vec!["radius.json", "/ball/radius_m"]),
