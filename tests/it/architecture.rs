@@ -14,7 +14,7 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 const DOCUMENTS: [&str; 3] = ["ARCHITECTURE.md", "README.md", "CONTRIBUTING.md"];
 
 /// The folders of documents.
-const DOCUMENT_FOLDERS: [&str; 2] = ["docs", "docs/operations"];
+const DOCUMENT_FOLDERS: [&str; 3] = ["docs", "docs/internals", "docs/operations"];
 
 /// Returns the documents whose paths must exist: `DOCUMENTS` and those in `DOCUMENT_FOLDERS`.
 fn pages() -> Vec<String> {
