@@ -331,3 +331,33 @@ async fn unknown_keys_of_a_batch_are_named() {
     let meant = json!([{ "key": "cmd_qx", "meant": "cmd_qx_rad" }, { "key": "x", "meant": "x_m" }]);
     assert_eq!(ack["unknown"], meant);
 }
+
+/// A recording in parts, whose names are not in the order of their times.
+#[test]
+fn parts_of_one_recording_are_judged_as_the_whole() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let part = |rows: &[[Option<f64>; 5]]| table(HEADER, rows, ",", plain);
+    std::fs::create_dir(cli.path("parts")).unwrap();
+    cli.write("whole.csv", &part(&rows));
+    cli.write("parts/b.csv", &part(&rows[..1000]));
+    cli.write("parts/a.csv", &part(&rows[1000..]));
+    let hash = |line: &str| {
+        let summary: Value = serde_json::from_str(line).unwrap();
+        summary["verdict_hash"].clone()
+    };
+    let judged = |line: &str| hash(cli.ok(line).stdout.lines().last().unwrap());
+    let whole = judged("replay --format json whole.csv");
+    assert_eq!(judged("replay --format json --join parts"), whole);
+    assert_eq!(judged("replay --format json --join parts/a.csv parts/b.csv"), whole);
+    assert_ne!(judged("replay --format json parts/a.csv"), whole);
+
+    let refused = |line: &str| cli.run(3, line).stderr;
+    let overlapping = refused("replay --join whole.csv parts/b.csv");
+    let expected =
+        "whole.csv: it has a sample at 0.00 s, and parts/b.csv ends at 9.99 s: they overlap";
+    assert!(overlapping.contains(expected), "{overlapping}");
+    cli.write("runs.csv", &(part(&rows[..10]) + &part(&rows[..10])));
+    let runs = refused("replay --join runs.csv parts/a.csv");
+    assert!(runs.contains("runs.csv: its clock starts again; it has several runs"), "{runs}");
+}

@@ -53,7 +53,7 @@ impl Recording {
         match &*self.files {
             [file] => InputError::file(file, error),
             // It names the file.
-            _ => InputError::new(&self.name, error),
+            _ => InputError::new(self.words(), error),
         }
     }
 
@@ -81,7 +81,7 @@ impl JoinArgs {
             }
         }
         if self.join {
-            let name = session_name(paths.first().unwrap_or(&files[0]));
+            let name = paths.first().map_or_else(String::new, |path| session_name(path));
             return Ok(vec![Recording { name, files }]);
         }
         Ok(files.iter().map(|file| Recording::of(file)).collect())
@@ -113,6 +113,8 @@ struct Part {
     /// The rejected rows before its first sample, and the sample.
     first: std::vec::IntoIter<Result<Sample, SessionRowError>>,
     begins_s: f64,
+    /// Latest time so far, s.
+    ends_s: f64,
 }
 
 impl Part {
@@ -127,16 +129,17 @@ impl Part {
                 break;
             }
         }
-        Ok(Self { path: path.to_owned(), rows, first: first.into_iter(), begins_s })
+        let (path, first) = (path.to_owned(), first.into_iter());
+        Ok(Self { path, rows, first, begins_s, ends_s: f64::NEG_INFINITY })
     }
 }
 
 /// The rows of several files, in the order of their times.
 struct JoinedRows {
-    /// The files, the present one last.
+    /// The files that are not over, the present one last.
     parts: Vec<Part>,
-    /// The end of the samples so far, s, and the file that has it.
-    end: Option<(f64, PathBuf)>,
+    /// The end of the file before, s, and the file.
+    before: Option<(f64, PathBuf)>,
 }
 
 impl JoinedRows {
@@ -144,7 +147,7 @@ impl JoinedRows {
         let parts = files.iter().map(|file| Part::open(file, options));
         let mut parts = parts.collect::<Result<Vec<_>, _>>()?;
         parts.sort_by(|a, b| b.begins_s.total_cmp(&a.begins_s));
-        Ok(Self { parts, end: None })
+        Ok(Self { parts, before: None })
     }
 }
 
@@ -154,36 +157,36 @@ impl Iterator for JoinedRows {
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             let part = self.parts.last_mut()?;
-            let name = part.path.display();
-            let unfit = |reason: String| {
-                let error = SessionFileError::Unfit(format!("{name}: {reason}"));
-                Some(Err(SessionRowError::Unreadable(error)))
+            let unreadable = |reason: String| {
+                let file = part.path.display().to_string();
+                Some(Err(SessionRowError::Unreadable(SessionFileError::Part { file, reason })))
             };
             match part.first.next().or_else(|| part.rows.next()) {
-                None => drop(self.parts.pop()),
-                Some(Ok(_)) if part.rows.n_runs() > 1 => {
-                    return unfit(
-                        "its clock starts again, so that its runs are no one recording".to_owned(),
-                    );
+                None => {
+                    let ended = self.parts.pop().map(|part| (part.ends_s, part.path));
+                    // A file without samples ends nowhere.
+                    self.before = ended.filter(|(s, _)| s.is_finite()).or(self.before.take());
                 }
-                Some(Ok(sample)) => {
-                    let end = self.end.as_ref().filter(|(_, file)| *file != part.path);
-                    if let Some((end_s, file)) = end.filter(|(end_s, _)| *end_s >= sample.t_s) {
-                        return unfit(format!(
-                            "it begins at {} s, and {} ends at {end_s} s: they overlap",
-                            sample.t_s,
-                            file.display()
+                Some(Ok(_)) if part.rows.n_runs() > 1 => {
+                    return unreadable("its clock starts again; it has several runs".to_owned());
+                }
+                Some(Ok(sample)) => match &self.before {
+                    Some((end_s, file)) if sample.t_s <= *end_s => {
+                        let (t_s, file) = (sample.t_s, file.display());
+                        return unreadable(format!(
+                            "it has a sample at {t_s:.2} s, and {file} ends at {end_s:.2} s: they overlap"
                         ));
                     }
-                    let end_s = self.end.as_ref().map_or(sample.t_s, |(s, _)| s.max(sample.t_s));
-                    self.end = Some((end_s, part.path.clone()));
-                    return Some(Ok(sample));
-                }
+                    _ => {
+                        part.ends_s = part.ends_s.max(sample.t_s);
+                        return Some(Ok(sample));
+                    }
+                },
                 Some(Err(SessionRowError::Rejected(RejectedRow { place, reason }))) => {
-                    let reason = format!("{reason} ({name})");
+                    let reason = format!("{reason} ({})", part.path.display());
                     return Some(Err(SessionRowError::Rejected(RejectedRow { place, reason })));
                 }
-                Some(Err(SessionRowError::Unreadable(error))) => return unfit(error.to_string()),
+                Some(Err(SessionRowError::Unreadable(e))) => return unreadable(e.to_string()),
             }
         }
     }

@@ -123,10 +123,4 @@ mod tests {
         // The second batch takes 1.3 times the 5 ms that a measurement fills.
         assert_eq!(n_runs, 1 + 20 * 2167);
     }
-
-    #[test]
-    fn the_clock_is_of_work_and_not_of_waiting() {
-        let ((), waited_s) = cpu_once(|| std::thread::sleep(std::time::Duration::from_millis(50)));
-        assert!(cfg!(not(unix)) || waited_s < 0.05, "{waited_s}");
-    }
 }

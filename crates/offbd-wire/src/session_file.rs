@@ -223,9 +223,9 @@ pub enum SessionFileError {
     /// The first sheet of a workbook is no session.
     #[error("sheet `{sheet}`: {reason}")]
     Sheet { sheet: String, reason: String },
-    /// Files that are not one recording.
-    #[error("{0}")]
-    Unfit(String),
+    /// A file that is a part of a recording and cannot be read, or does not continue the others.
+    #[error("{file}: {reason}")]
+    Part { file: String, reason: String },
     #[error("the JSON document is not a recording: {0}")]
     Json(String),
     /// An MCAP file without a topic of the schema.
@@ -367,6 +367,7 @@ pub fn open<S: Read + Seek + Send + 'static>(
 }
 
 /// What a text was in the file.
+#[derive(Clone, Debug)]
 pub(crate) enum TextKind {
     /// The file, whose rows are known by their lines.
     Text,

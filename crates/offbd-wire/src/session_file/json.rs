@@ -29,7 +29,7 @@ const MAX_COLUMNS: usize = 1000;
 /// most of their columns.
 const MAX_TEXT_BYTES: usize = 128 << 20;
 
-/// How deep the list of rows or of columns may be. Chosen: `{"data": {"samples": […]}}` is one less.
+/// Most objects around the list of rows or of columns. Chosen: exports have one or two.
 const MAX_DEPTH: usize = 3;
 
 /// Part of the longest list that a list needs to be a column. Chosen: lists of settings are shorter.
@@ -90,7 +90,7 @@ struct Table {
     cells: Vec<String>,
     rows: Vec<u8>,
     n_rows: usize,
-    /// Whether a row is a list, of this many values at most.
+    /// Most values of a row that is a list; 0 if none is.
     list_width: usize,
     /// The list that has the rows.
     place_of_rows: Option<String>,
@@ -204,7 +204,12 @@ impl Table {
         }
         if self.names.is_empty() {
             let width = self.list_width;
-            let names = self.columns.iter().find(|column| column.ends.len() == width);
+            // A list of numbers, such as an index, has no names.
+            let is_name = |name: &str| name.parse::<f64>().is_err();
+            let has_names = |column: &&Column| {
+                column.ends.len() == width && (0..width).all(|i| is_name(column.get(i)))
+            };
+            let names = self.columns.iter().find(has_names);
             self.names = names
                 .map_or(Vec::new(), |names| (0..width).map(|i| names.get(i).to_owned()).collect());
         }
@@ -264,6 +269,21 @@ impl From<serde_json::Error> for SessionFileError {
     }
 }
 
+/// Visitors that write what they visit to the table that they borrow.
+macro_rules! seeds {
+    ($($name:ident),*) => {$(
+        impl<'de> DeserializeSeed<'de> for $name<'_> {
+            type Value = ();
+
+            fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
+                json.deserialize_any(self)
+            }
+        }
+    )*};
+}
+
+seeds!(Part, Element, Row, Member);
+
 /// The values that are neither lists nor objects, each by its text.
 macro_rules! visit_values {
     () => {
@@ -305,14 +325,6 @@ impl Part<'_> {
     #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as in the others")]
     fn value<E>(self, _: impl fmt::Display) -> Result<(), E> {
         Ok(())
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for Part<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
     }
 }
 
@@ -392,14 +404,6 @@ impl Element<'_> {
     }
 }
 
-impl<'de> DeserializeSeed<'de> for Element<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
-    }
-}
-
 impl<'de> Visitor<'de> for Element<'_> {
     type Value = ();
 
@@ -420,14 +424,6 @@ impl<'de> Visitor<'de> for Element<'_> {
 
 /// A row: an object, or a list of values.
 struct Row<'a>(&'a mut Table);
-
-impl<'de> DeserializeSeed<'de> for Row<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
-    }
-}
 
 impl<'de> Visitor<'de> for Row<'_> {
     type Value = ();
@@ -486,14 +482,6 @@ impl Member<'_> {
     fn within(&mut self, key: fmt::Arguments<'_>) -> Member<'_> {
         let _ = self.name.write_fmt(key);
         Member { table: self.table, name: self.name, place: self.place }
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for Member<'_> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<(), D::Error> {
-        json.deserialize_any(self)
     }
 }
 
@@ -561,6 +549,8 @@ mod tests {
             assert_eq!(text(document), expected, "{document}");
         }
         assert_eq!(text("[[0,1],[0.1,2]]"), "0,1\n0.1,2\n");
+        let indexed = r#"{"size":[0.2,0.2],"index":[0,1],"data":[[0,1],[0.1,2]]}"#;
+        assert_eq!(text(indexed), "0,1\n0.1,2\n", "numbers are no names");
     }
 
     #[test]

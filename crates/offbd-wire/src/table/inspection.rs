@@ -141,12 +141,13 @@ pub fn inspect(
     if format == SessionFormat::Xlsx {
         let sheet = session_file::xlsx::sheet(source)?;
         view.layout.push(format!("the sheet `{}`", sheet.name));
-        return inspect_text(view, std::io::Cursor::new(sheet.text), options);
+        return inspect_text(view, &TextKind::Text, std::io::Cursor::new(sheet.text), options);
     }
     if format == SessionFormat::Json {
         let table = session_file::json::table(source)?;
         view.layout.push(table.layout.to_owned());
-        return inspect_text(view, std::io::Cursor::new(table.text), options);
+        let kind = table.kind();
+        return inspect_text(view, &kind, std::io::Cursor::new(table.text), options);
     }
     if format != SessionFormat::Csv {
         let rows = &mut *session_file::open(source, Some(format), options)?;
@@ -154,11 +155,12 @@ pub fn inspect(
         show(&mut view, &samples, |quantity| (Some(COLUMNS[quantity].to_owned()), None));
         return Ok(view);
     }
-    inspect_text(view, source, options)
+    inspect_text(view, &TextKind::Text, source, options)
 }
 
 fn inspect_text(
     mut view: InspectionView,
+    kind: &TextKind,
     mut source: impl Read + Seek + Send,
     options: &TableOptions,
 ) -> Result<InspectionView, SessionFileError> {
@@ -176,12 +178,12 @@ fn inspect_text(
         view.remark("there is no time; give the rate, in rows a second");
         rate_hz = Some(1.0);
     }
-    let mut samples = read_table(&mut view, &mut source, &mapping, rate_hz)?;
+    let mut samples = read_table(&mut view, kind, &mut source, &mapping, rate_hz)?;
     let before = mapping.clone();
     check::by_motion(&mut view, &dialect.names, &mut mapping, &mut guesses, &samples);
     if mapping != before {
         view.forget_rows();
-        samples = read_table(&mut view, &mut source, &mapping, rate_hz)?;
+        samples = read_table(&mut view, kind, &mut source, &mapping, rate_hz)?;
     }
     if !(options.columns.is_empty() && guesses.is_empty()) {
         view.mapping = mapping.with_names(&dialect.names).to_string();
@@ -210,13 +212,14 @@ impl InspectionView {
 /// Reads the rows of a text by `mapping`; no sample if a column is missing.
 fn read_table(
     view: &mut InspectionView,
+    kind: &TextKind,
     source: &mut (impl Read + Seek + Send),
     mapping: &ColumnMapping,
     rate_hz: Option<f64>,
 ) -> Result<Vec<Sample>, SessionFileError> {
     source.rewind()?;
     let options = TableOptions { columns: mapping.clone(), rate_hz, ..TableOptions::default() };
-    match TextRows::new(TextKind::Text, source, &options) {
+    match TextRows::new(kind.clone(), source, &options) {
         Ok(mut rows) => read(view, &mut rows),
         Err(SessionFileError::Csv(CsvError::MissingColumn { name, .. })) => {
             view.remark(format!("no column is likely to be `{name}`; map one"));

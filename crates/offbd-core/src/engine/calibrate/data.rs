@@ -76,7 +76,7 @@ impl Data {
     /// there; `None` if no sample is in it.
     ///
     /// # Errors
-    /// [`CannotCalibrate::Contradictory`] if that is too much of it.
+    /// [`CannotCalibrate::Sticks`] if it has stood before.
     pub(super) fn leave_out_stop(
         &mut self,
         session: usize,
@@ -114,11 +114,12 @@ impl Data {
         apart.push(moment);
         apart.sort_by(|a, b| a.session.cmp(&b.session).then(a.from_s.total_cmp(&b.from_s)));
         self.left_out = apart;
-        self.check_share(session).map(|()| Some(moment))
+        self.check_left_out(session).map(|()| Some(moment))
     }
 
-    /// Checks that not too much is left out of `session`.
-    fn check_share(&self, session: usize) -> Result<(), CannotCalibrate> {
+    /// Checks that not too much is left out of `session`: one stop, since a hand holds the ball once
+    /// and friction again and again, and a small share of the rest.
+    fn check_left_out(&self, session: usize) -> Result<(), CannotCalibrate> {
         let is_stop = |m: &&LeftOut| m.reason == Contradiction::Stood;
         let mut stops = self.left_out.iter().filter(|m| m.session == session).filter(is_stop);
         if let (Some(first), n @ 1..) = (stops.next(), stops.count()) {

@@ -42,8 +42,8 @@ use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 /// Lengths of a window, s, the preferred first: a ball that sticks every other second
 /// offers only short stretches of motion. Chosen.
 pub(super) const WINDOWS_S: [f64; 2] = [1.2, 0.6];
-/// Least time that all sessions last together, s. Chosen: half of the minute that a rig is asked for.
-/// From less it cannot be told how the rig varies, and its healthy variation would count as faults.
+/// Least time that all sessions last together, s. Chosen: half of the minute that people are asked to
+/// record. Less does not show how the rig varies, and its healthy variation would count as faults.
 const LEAST_S: f64 = 30.0;
 /// Least number of windows with a moving ball. Chosen.
 const LEAST_WINDOWS: usize = 6;

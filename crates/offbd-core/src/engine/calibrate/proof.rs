@@ -38,7 +38,7 @@ const MOST_SCATTER_M: f64 = 1e-3;
 ///
 /// # Errors
 /// [`CannotCalibrate::Untested`] if there is too little to judge by,
-/// [`CannotCalibrate::Contradictory`] if too much is left out, and
+/// [`CannotCalibrate::Contradictory`] or [`CannotCalibrate::Sticks`] if too much is left out, and
 /// [`CannotCalibrate::AccusesItself`] if nothing that can be widened helps.
 pub(super) fn prove(
     rig: &Rig,
@@ -82,14 +82,10 @@ fn leave_out_jumps(
     folds: &mut [Fold],
     tests: &[SelfTest],
 ) -> Result<bool, CannotCalibrate> {
-    let mut any = false;
-    for test in tests {
-        let jumped = test.alarm.and_then(|alarm| Some((alarm.jump_s?, alarm.at_s)));
-        let Some((jump_s, at_s)) = jumped else { continue };
-        let left_out = data.leave_out_jump(test.session, jump_s, at_s)?;
-        any |= left_out.map(|moment| forget(folds, &moment)).is_some();
-    }
-    Ok(any)
+    leave_out(folds, tests, |session, alarm| match alarm.jump_s {
+        Some(jump_s) => data.leave_out_jump(session, jump_s, alarm.at_s),
+        None => Ok(None),
+    })
 }
 
 /// Leaves out the moments in which `tests` found that the ball stands, of `data` and of `folds`.
@@ -99,24 +95,31 @@ fn leave_out_stops(
     folds: &mut [Fold],
     tests: &[SelfTest],
 ) -> Result<bool, CannotCalibrate> {
-    let mut any = false;
-    for test in tests {
-        let stood =
-            |alarm: &Accusation| alarm.code == FaultCode::StuckBall && alarm.still_s >= STOOD_S;
-        let Some(alarm) = test.alarm.filter(stood) else { continue };
-        let since_s = alarm.at_s - alarm.still_s;
-        let left_out = data.leave_out_stop(test.session, since_s, alarm.at_s)?;
-        any |= left_out.map(|moment| forget(folds, &moment)).is_some();
-    }
-    Ok(any)
+    leave_out(folds, tests, |session, alarm| {
+        if alarm.code != FaultCode::StuckBall || alarm.still_s < STOOD_S {
+            return Ok(None);
+        }
+        data.leave_out_stop(session, alarm.at_s - alarm.still_s, alarm.at_s)
+    })
 }
 
-/// Removes a moment from the sessions that are judged.
-fn forget(folds: &mut [Fold], moment: &LeftOut) {
-    let of_session = |(session, _): &&mut (usize, Vec<Sample>)| *session == moment.session;
-    for (_, samples) in folds.iter_mut().flat_map(|f| &mut f.judged).filter(of_session) {
-        samples.retain(|s| !moment.contains(s.t_s));
+/// Leaves out what `moment` returns for the alarms of `tests`, of `folds`. Returns whether there was
+/// any.
+fn leave_out(
+    folds: &mut [Fold],
+    tests: &[SelfTest],
+    mut moment: impl FnMut(usize, &Accusation) -> Result<Option<LeftOut>, CannotCalibrate>,
+) -> Result<bool, CannotCalibrate> {
+    let mut any = false;
+    for (session, alarm) in tests.iter().filter_map(|t| Some((t.session, t.alarm.as_ref()?))) {
+        let Some(moment) = moment(session, alarm)? else { continue };
+        any = true;
+        let of_session = |(judged, _): &&mut (usize, Vec<Sample>)| *judged == session;
+        for (_, samples) in folds.iter_mut().flat_map(|f| &mut f.judged).filter(of_session) {
+            samples.retain(|s| !moment.contains(s.t_s));
+        }
     }
+    Ok(any)
 }
 
 /// Returns `learnt` with the largest values seen in the tests, and its certificate.
