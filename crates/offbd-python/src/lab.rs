@@ -6,7 +6,7 @@ use crate::table::{Table, numbers};
 use crate::{rig, unusable};
 use offbd_core::plant::Motion;
 use offbd_core::vocabulary::{Invalid, Sample, positive};
-use offbd_lab::scene::{Configuration, Method, Model, Pace, Samples, choose, run, suits};
+use offbd_lab::scene::{Configuration, Method, Model, Pace, Samples, one_pass, run, suits};
 use offbd_lab::simulation::{
     Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig, Variety,
 };
@@ -88,45 +88,40 @@ pub(crate) fn scene(
         return Err(unusable(format!("sample_s: over {MAX_SAMPLES} samples")));
     }
     py.detach(|| {
-        let by = configuration(&scene, model, method, step_s, tolerance_m)?;
-        let rows = trajectory(&scene, &by, sample_s)?;
-        Ok((by.model().name(), by.method().name(), table(&rows)?))
+        let mut rows = Vec::new();
+        let mut sink = |t_s: f64, at: &Motion| rows.push((t_s, *at));
+        let mut samples = Samples::new(sample_s, &mut sink);
+        let ran = if let Some(model) = model {
+            let by = configuration(&scene, model, method, step_s, tolerance_m)?;
+            run(&scene.scene, &mut scene.laws.clone(), &by, Some(&mut samples))
+                .map_err(unusable)?;
+            (by.model().name(), by.method().name())
+        } else {
+            if method.is_some() || step_s.is_some() {
+                return Err(unusable("method and step_s need a model"));
+            }
+            let tolerance_m = positive("/tolerance_m", tolerance_m, 1.0).map_err(unusable)?;
+            let mut laws = scene.laws.clone();
+            one_pass(&scene.scene, &mut laws, tolerance_m, Some(&mut samples))
+                .map_err(unusable)?
+                .most_accurate()
+        };
+        Ok((ran.0, ran.1, table(&rows)?))
     })
 }
 
-/// Returns the configuration with these choices; without a model, the cheapest that meets the
-/// tolerance.
+/// Returns the configuration with these choices.
 fn configuration(
     scene: &NamedScene,
-    model: Option<Model>,
+    model: Model,
     method: Option<Method>,
     step_s: Option<f64>,
     tolerance_m: f64,
 ) -> PyResult<Configuration> {
-    let Some(model) = model else {
-        if method.is_some() || step_s.is_some() {
-            return Err(unusable("method and step_s need a model"));
-        }
-        let tolerance_m = positive("/tolerance_m", tolerance_m, 1.0).map_err(unusable)?;
-        let choice = choose(&scene.scene, &scene.laws, tolerance_m);
-        return Ok(choice.map_err(unusable)?.configuration);
-    };
     suits(&scene.scene, model).map_err(unusable)?;
     let method = method.unwrap_or_else(|| model.usual_method());
     let pace = step_s.map_or(Pace::Tolerance(tolerance_m), Pace::Step);
     Configuration::new(model, method, pace).map_err(unusable)
-}
-
-fn trajectory(
-    scene: &NamedScene,
-    by: &Configuration,
-    sample_s: f64,
-) -> PyResult<Vec<(f64, Motion)>> {
-    let mut rows = Vec::new();
-    let mut sink = |t_s: f64, at: &Motion| rows.push((t_s, *at));
-    let mut samples = Samples::new(sample_s, &mut sink);
-    run(&scene.scene, &mut scene.laws.clone(), by, Some(&mut samples)).map_err(unusable)?;
-    Ok(rows)
 }
 
 fn table(rows: &[(f64, Motion)]) -> PyResult<Table> {

@@ -6,7 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use offbd_core::plant::GRAVITY_M_S2;
 use offbd_core::vocabulary::Invalid;
 use offbd_lab::scene::{
-    Choice, Configuration, Drive, Method, Model, Pace, Scene, TriedCandidate, choose, suits,
+    Choice, Configuration, Declined, Drive, Method, Model, OutOfReach, Pace, Scene, TriedCandidate,
+    choose, suits,
 };
 use offbd_lab::timing::cpu_once;
 use offbd_terminal::errors::BadArgument;
@@ -29,6 +30,10 @@ pub(super) struct ConfigurationArgs {
     /// its method [default: 1e-4]
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = positive_number)]
     pub tolerance: Option<f64>,
+    /// Search for the cheapest model and method by trial runs, for a scene that
+    /// is to run many times [default: one pass that changes models as it goes]
+    #[arg(long, conflicts_with_all = ["model", "method", "step"])]
+    pub search: bool,
 }
 
 /// A named choice, or `None` for `auto`.
@@ -52,7 +57,7 @@ pub(super) fn positive_number(word: &str) -> Result<f64, String> {
 }
 
 /// Default accuracy, m; chosen.
-const TOLERANCE_M: f64 = 1e-4;
+pub(super) const TOLERANCE_M: f64 = 1e-4;
 
 /// Default fixed step, s: the chapter's longest.
 const STEP_S: f64 = 1e-3;
@@ -60,7 +65,8 @@ const STEP_S: f64 = 1e-3;
 /// The configuration to be run, and its origin.
 #[derive(Clone, Debug)]
 pub(super) struct Decision {
-    pub configuration: Configuration,
+    /// `None` for a run in one pass.
+    pub configuration: Option<Configuration>,
     /// The accuracy requested from `auto`, m.
     pub wanted_m: Option<f64>,
     /// The choice of `auto`, if it was requested.
@@ -69,22 +75,42 @@ pub(super) struct Decision {
     pub choosing_s: f64,
 }
 
-/// No candidate meets the tolerance.
+/// No model keeps the tolerance.
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "no model and method meets {tolerance_m:e} m here; the best accuracy is about {best_m:.1e} m"
-)]
+#[error("{why}")]
 pub(super) struct NoModelMeets {
-    tolerance_m: f64,
-    best_m: f64,
+    why: String,
     pub tried: Vec<TriedCandidate>,
+}
+
+impl From<OutOfReach> for NoModelMeets {
+    fn from(none: OutOfReach) -> Self {
+        let OutOfReach { tolerance_m, best_m, tried } = none;
+        let why = format!(
+            "no model and method meets {tolerance_m:e} m here; the best accuracy is about \
+             {best_m:.1e} m"
+        );
+        Self { why, tried }
+    }
+}
+
+impl From<Declined> for NoModelMeets {
+    fn from(declined: Declined) -> Self {
+        Self { why: declined.to_string(), tried: Vec::new() }
+    }
 }
 
 impl ConfigurationArgs {
     /// Returns whether all options have their defaults.
     pub(super) fn is_plain(&self) -> bool {
-        let Self { model, method, step, tolerance } = self;
-        model.0.is_none() && method.0.is_none() && step.is_none() && tolerance.is_none()
+        let Self { model, method, step, tolerance, search } = self;
+        let asked = step.is_some() || tolerance.is_some() || *search;
+        model.0.is_none() && method.0.is_none() && !asked
+    }
+
+    /// Returns whether model and method are left to the program.
+    pub(super) fn chooses(&self) -> bool {
+        self.model.0.is_none() && self.method.0.is_none()
     }
 
     pub(super) fn decide<D: Drive + Clone>(
@@ -93,7 +119,7 @@ impl ConfigurationArgs {
         drive: &D,
     ) -> anyhow::Result<Decision> {
         if let Some(model) = self.model.0 {
-            let configuration = self.configured(scene, model)?;
+            let configuration = Some(self.configured(scene, model)?);
             return Ok(Decision { configuration, wanted_m: None, choice: None, choosing_s: 0.0 });
         }
         let wanted_m = self.tolerance.unwrap_or(TOLERANCE_M);
@@ -101,12 +127,13 @@ impl ConfigurationArgs {
             let text = format!("--tolerance: {wanted_m} is outside 1e-12 to 1");
             return Err(BadArgument(text).into());
         }
+        let wanted = Some(wanted_m);
+        if self.method.0.is_none() && self.step.is_none() && !self.search {
+            let (configuration, choice) = (None, None);
+            return Ok(Decision { configuration, wanted_m: wanted, choice, choosing_s: 0.0 });
+        }
         let (choice, choosing_s) = cpu_once(|| choose(scene, drive, wanted_m));
-        let choice = choice.map_err(|none| NoModelMeets {
-            tolerance_m: wanted_m,
-            best_m: none.best_m,
-            tried: none.tried,
-        })?;
+        let choice = choice.map_err(NoModelMeets::from)?;
         let chosen = choice.configuration;
         let fits = self.method.0.is_none_or(|method| method == chosen.method());
         let configuration = if fits && self.step.is_none() {
@@ -114,7 +141,8 @@ impl ConfigurationArgs {
         } else {
             self.configured(scene, self.able(chosen.model()))?
         };
-        Ok(Decision { configuration, wanted_m: Some(wanted_m), choice: Some(choice), choosing_s })
+        let configuration = Some(configuration);
+        Ok(Decision { configuration, wanted_m: wanted, choice: Some(choice), choosing_s })
     }
 
     /// Returns the chosen model if the requested method and step can run it; else the most

@@ -1,5 +1,6 @@
 //! Drawings of runs: position over time, the path on the plate, two bodies side by side.
 
+use super::report;
 use super::scene_run::{Sampled, SceneRun};
 use super::words;
 use offbd_core::plant::{Motion, Plate, PlateShape};
@@ -48,7 +49,7 @@ pub(super) fn figure(
 }
 
 fn ran(scene_run: &SceneRun) -> String {
-    let configuration = words::configuration(&scene_run.decision.configuration);
+    let configuration = report::ran(scene_run);
     let mut chars = configuration.chars();
     let first = chars.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", chars.as_str())

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::scene_run::SceneRun;
 use super::words;
 use offbd_core::plant::Motion;
-use offbd_lab::scene::{Event, Model, Pace, TriedCandidate};
+use offbd_lab::scene::{Event, Model, Pace, Stage, TriedCandidate};
 use offbd_terminal::table;
 
 /// Maximum number of events printed as text; chosen. JSON has all of them.
@@ -20,9 +20,10 @@ pub(super) fn lines(scene_run: &SceneRun) -> Vec<String> {
     ];
     lines.extend(events(scene_run));
     lines.push(String::new());
-    lines.push(row("ran", &words::configuration(&scene_run.decision.configuration)));
+    lines.push(row("ran", &ran(scene_run)));
     lines.push(row("why", &why(scene_run)));
     lines.extend(effort(scene_run));
+    lines.extend(stages(&scene_run.stages));
     lines.extend(tried(scene_run.decision.choice.as_ref().map_or(&[], |choice| &choice.tried)));
     lines
 }
@@ -43,16 +44,32 @@ pub(super) fn row(word: &str, text: &str) -> String {
     table::wrapped(&format!("{word:<11}"), text)
 }
 
+/// Describes model, method and pace.
+pub(super) fn ran(scene_run: &SceneRun) -> String {
+    let in_one_pass = || {
+        let models: Vec<&str> = scene_run.stages.iter().map(|stage| stage.model).collect();
+        format!("in one pass: {}", models.join(", then "))
+    };
+    scene_run.decision.configuration.as_ref().map_or_else(in_one_pass, words::configuration)
+}
+
 fn why(scene_run: &SceneRun) -> String {
     let decision = &scene_run.decision;
-    let (Some(wanted), Some(choice)) = (decision.wanted_m, &decision.choice) else {
+    let wanted = decision.wanted_m.unwrap_or_default();
+    let Some(by) = &decision.configuration else {
+        return format!(
+            "the cheapest models that keep {} m as the scene goes",
+            words::plain(wanted)
+        );
+    };
+    let Some(choice) = &decision.choice else {
         return "asked for".to_owned();
     };
-    if choice.configuration == decision.configuration {
+    if choice.configuration == *by {
         return format!("the cheapest that meets {} m", words::plain(wanted));
     }
     let model = choice.configuration.model();
-    if model == decision.configuration.model() {
+    if model == by.model() {
         format!("the {model} model meets {} m; the rest was asked for", words::plain(wanted))
     } else {
         format!("the {model} model would do, but what was asked for does not step it")
@@ -60,19 +77,17 @@ fn why(scene_run: &SceneRun) -> String {
 }
 
 fn error(scene_run: &SceneRun) -> String {
-    let decision = &scene_run.decision;
-    if let Some(choice) =
-        decision.choice.as_ref().filter(|c| c.configuration == decision.configuration)
-    {
-        return format!("about {}, estimated", words::metres(choice.error_m));
+    if let Some(error_m) = estimated_error_m(scene_run) {
+        return format!("about {}, estimated", words::metres(error_m));
     }
-    let model = match decision.configuration.model() {
-        Model::Planar | Model::Rolling => Some(scene_run.survey.rolling_error_m),
-        Model::Creeping => Some(scene_run.survey.creeping_error_m),
-        Model::Sliding | Model::Compliant => None,
+    let by = scene_run.decision.configuration;
+    let model = match by.map(|by| by.model()) {
+        Some(Model::Planar | Model::Rolling) => Some(scene_run.survey.rolling_error_m),
+        Some(Model::Creeping) => Some(scene_run.survey.creeping_error_m),
+        _ => None,
     };
-    let method = match (decision.configuration.pace(), &scene_run.outcome) {
-        (Pace::Tolerance(_), Ok(outcome)) => {
+    let method = match (by.map(|by| by.pace()), &scene_run.outcome) {
+        (Some(Pace::Tolerance(_)), Ok(outcome)) => {
             format!("the method's about {}", words::metres(outcome.statistics.method_error_m))
         }
         _ => "the method's not estimated at fixed steps".to_owned(),
@@ -81,6 +96,29 @@ fn error(scene_run: &SceneRun) -> String {
         Some(model) => format!("the model's about {}, {method}", words::metres(model)),
         None => method,
     }
+}
+
+/// Returns the estimated error of model and method together, m, where there is one.
+fn estimated_error_m(scene_run: &SceneRun) -> Option<f64> {
+    let decision = &scene_run.decision;
+    match (&decision.configuration, &decision.choice, &scene_run.outcome) {
+        (None, _, Ok(outcome)) => Some(outcome.statistics.method_error_m),
+        (Some(by), Some(choice), _) if choice.configuration == *by => Some(choice.error_m),
+        _ => None,
+    }
+}
+
+/// Returns the models of a run in one pass as a table.
+fn stages(stages: &[Stage]) -> Vec<String> {
+    if stages.is_empty() {
+        return Vec::new();
+    }
+    let mut rows = table::table(&["from s", "model", "by", "because"], &[0]);
+    for stage in stages {
+        let from = format!("{:.4}", stage.from_s);
+        rows.add_row([&from, stage.model, stage.method, stage.why]);
+    }
+    std::iter::once(String::new()).chain(table::lines(&rows)).collect()
 }
 
 fn effort(scene_run: &SceneRun) -> Vec<String> {
@@ -130,22 +168,26 @@ fn events(scene_run: &SceneRun) -> Vec<String> {
 /// Returns the JSON object.
 pub(super) fn object(scene_run: &SceneRun) -> Value {
     let SceneRun { decision, outcome, .. } = scene_run;
-    let (step_s, tolerance_m) = match decision.configuration.pace() {
-        Pace::Step(step) => (Some(step), None),
-        Pace::Tolerance(tolerance) => (None, Some(tolerance)),
+    let (step_s, tolerance_m) = match decision.configuration.map(|by| by.pace()) {
+        Some(Pace::Step(step)) => (Some(step), None),
+        Some(Pace::Tolerance(tolerance)) => (None, Some(tolerance)),
+        None => (None, None),
     };
+    let last = scene_run.stages.last();
+    let by = decision.configuration.as_ref();
     let choice = decision.choice.as_ref();
     let statistics = outcome.as_ref().ok().map(|outcome| outcome.statistics);
     json!({
         "scene": scene_run.name,
         "duration_s": scene_run.scene.duration_s,
-        "model": decision.configuration.model().name(),
-        "method": decision.configuration.method().name(),
+        "model": by.map(|by| by.model().name()).or(last.map(|stage| stage.model)),
+        "method": by.map(|by| by.method().name()).or(last.map(|stage| stage.method)),
+        "stages": scene_run.stages.iter().map(stage_object).collect::<Vec<_>>(),
         "step_s": step_s,
         "tolerance_m": tolerance_m,
         "why": why(scene_run),
         "wanted_m": decision.wanted_m,
-        "error_m": choice.filter(|c| c.configuration == decision.configuration).map(|c| c.error_m),
+        "error_m": estimated_error_m(scene_run),
         "friction_demand": scene_run.survey.demand,
         "tried": choice.map(|c| c.tried.iter().map(tried_object).collect::<Vec<_>>()),
         "steps": statistics.map(|t| t.steps),
@@ -157,6 +199,11 @@ pub(super) fn object(scene_run: &SceneRun) -> Value {
         "warnings": scene_run.warnings,
         "failure": outcome.as_ref().err().map(ToString::to_string),
     })
+}
+
+fn stage_object(stage: &Stage) -> Value {
+    let Stage { from_s, model, method, why } = stage;
+    json!({ "from_s": from_s, "model": model, "method": method, "why": why })
 }
 
 fn tried_object(tried: &TriedCandidate) -> Value {

@@ -1,10 +1,10 @@
 //! Runs a scene: the decision, the result, and warnings.
 
-use super::decide::{ConfigurationArgs, Decision};
+use super::decide::{ConfigurationArgs, Decision, NoModelMeets, TOLERANCE_M};
 use offbd_core::plant::Motion;
 use offbd_lab::scene::{
-    Configuration, Drive, Event, Failure, Method, Model, Pace, RunOutcome, Samples, Scene, Subject,
-    Survey, run,
+    Configuration, Drive, Event, Failure, Method, Model, OnePass, Pace, RunOutcome, Samples, Scene,
+    Stage, Subject, Survey, one_pass, run,
 };
 use offbd_lab::timing::cpu_once;
 use offbd_terminal::errors::BadArgument;
@@ -32,6 +32,8 @@ pub(super) struct SceneRun {
     pub decision: Decision,
     pub survey: Survey,
     pub outcome: Result<RunOutcome, Failure>,
+    /// The models of a run in one pass, in order of time.
+    pub stages: Vec<Stage>,
     /// CPU time of the run, without samples, s.
     pub running_s: f64,
     pub samples: Vec<Sampled>,
@@ -59,20 +61,25 @@ impl RunRequest<'_> {
     ) -> anyhow::Result<SceneRun> {
         let every_s = self.every_s(scene)?;
         let decision = self.how.decide(scene, drive)?;
-        let configuration = decision.configuration;
         let (survey, events) = look(scene, drive);
         let mut before = drive.clone();
-        let (outcome, running_s) = cpu_once(|| run(scene, drive, &configuration, None));
+        let by = |drive: &mut D, samples: Option<&mut Samples<'_>>| match &decision.configuration {
+            Some(by) => Ok((run(scene, drive, by, samples), Vec::new())),
+            None => in_one_pass(scene, drive, decision.wanted_m, samples),
+        };
+        let (ran, running_s) = cpu_once(|| by(drive, None));
+        let (outcome, stages) = ran?;
         let mut samples = Vec::new();
         if self.sampled {
             let mut sink = |t: f64, at: &Motion| samples.push((t, *at));
             let mut taking = Samples::new(every_s, &mut sink);
             // The same run again: its outcome is the same.
-            let _ = run(scene, &mut before, &configuration, Some(&mut taking));
+            let _ = by(&mut before, Some(&mut taking));
         }
-        let asked = self.how.model.0.is_some() || self.how.method.0.is_some();
-        let warnings =
-            if asked { warnings(scene, &configuration, &survey, &events) } else { Vec::new() };
+        let warnings = match &decision.configuration {
+            Some(by) if !self.how.chooses() => warnings(scene, by, &survey, &events),
+            _ => Vec::new(),
+        };
         let (name, scene) = (name.to_owned(), scene.clone());
         Ok(SceneRun {
             name,
@@ -80,6 +87,7 @@ impl RunRequest<'_> {
             decision,
             survey,
             outcome,
+            stages,
             running_s,
             samples,
             events,
@@ -98,6 +106,18 @@ impl RunRequest<'_> {
             scene.duration_s
         )))
     }
+}
+
+/// Runs the scene in one pass within `wanted_m`.
+fn in_one_pass<D: Drive + Clone>(
+    scene: &Scene,
+    drive: &mut D,
+    wanted_m: Option<f64>,
+    samples: Option<&mut Samples<'_>>,
+) -> Result<(Result<RunOutcome, Failure>, Vec<Stage>), NoModelMeets> {
+    let OnePass { end, stages, statistics, .. } =
+        one_pass(scene, drive, wanted_m.unwrap_or(TOLERANCE_M), samples)?;
+    Ok((Ok(RunOutcome { end, statistics, events: Vec::new() }), stages))
 }
 
 /// Surveys the scene, and locates its events by the sliding model; no events if that run

@@ -41,6 +41,10 @@ pub(super) struct ContactDerivatives {
     by_slip: [[f64; 2]; 2],
 }
 
+/// A slip below this share of the threshold is none: how it grows depends on rounding;
+/// chosen.
+const NO_SLIP: f64 = 1e-6;
+
 impl Compliant {
     /// Creates the model as in the S-function, without its start-up delay of 1 ms.
     #[must_use]
@@ -109,6 +113,21 @@ impl Compliant {
         let normal = if self.push_only { normal.max(0.0) } else { normal };
         let [x, y] = self.mobilised_friction(self.body.slip(&at.velocity, &at.spin));
         Vector3::new(x * normal, y * normal, normal)
+    }
+
+    /// Returns the time in which a slip grows by a factor of e, s: while the damper pulls
+    /// the body back, friction has the sign of the slip and drives it. Infinite where no
+    /// slip grows.
+    #[inline]
+    pub(crate) fn slip_growth_s(&self, at: &Motion) -> f64 {
+        let pull = -self.force(at).z;
+        let threshold = self.contact.slip_threshold_m_s();
+        let slip = self.body.slip(&at.velocity, &at.spin);
+        let grows = |s: &f64| (NO_SLIP * threshold..threshold).contains(&s.abs());
+        if pull <= 0.0 || !slip.iter().any(grows) {
+            return f64::INFINITY;
+        }
+        threshold / (self.body.slip_ease() * self.contact.friction() * pull)
     }
 
     /// Returns the friction force per unit of normal force.

@@ -2,16 +2,35 @@
 
 use std::cell::Cell;
 
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 
 use super::law::Law;
-use offbd_core::plant::{Motion, PlateMotion, Tilt};
+use offbd_core::maths::sine::sin_cos;
+use offbd_core::plant::{GRAVITY_M_S2, Motion, PlateMotion, Tilt};
 
 /// The motion of the plate, in smooth pieces. Where a piece begins, the drive may read
 /// the body's motion, as a controller does.
 pub trait Drive {
     /// Returns the plate's tilt at time `t`, s, within the current piece.
     fn tilt(&self, t: f64) -> Tilt;
+
+    /// Returns the plate's motion at the times `at`, s, within the current piece.
+    #[inline]
+    fn nodes<const M: usize>(&self, at: &[f64; M]) -> PlateNodes<M> {
+        let tilts = at.map(|t| self.tilt(t));
+        PlateNodes::of(&[
+            AngleNodes {
+                angle: tilts.map(|tilt| tilt.angle.x),
+                rate: tilts.map(|tilt| tilt.rate.x),
+                acceleration: tilts.map(|tilt| tilt.acceleration.x),
+            },
+            AngleNodes {
+                angle: tilts.map(|tilt| tilt.angle.y),
+                rate: tilts.map(|tilt| tilt.rate.y),
+                acceleration: tilts.map(|tilt| tilt.acceleration.y),
+            },
+        ])
+    }
 
     /// Returns the force on the body's centre along x and y in the current piece, N.
     fn push(&self) -> Vector2<f64>;
@@ -26,6 +45,63 @@ pub trait Drive {
     /// Returns the shortest time scale of the plate's motion, s: a period or the duration
     /// of a step.
     fn shortest_time_s(&self) -> f64;
+}
+
+/// An angle at several times, rad, with its first and second derivatives.
+pub struct AngleNodes<const M: usize> {
+    pub angle: [f64; M],
+    pub rate: [f64; M],
+    pub acceleration: [f64; M],
+}
+
+/// The plate's motion in its own frame at several times, as [`PlateMotion`], each
+/// component side by side, so that the compiler can vectorise over the times.
+pub struct PlateNodes<const M: usize> {
+    pub omega: [[f64; M]; 3],
+    pub alpha: [[f64; M]; 3],
+    pub gravity: [[f64; M]; 3],
+}
+
+impl<const M: usize> PlateNodes<M> {
+    /// Builds the motion from those of qx and qy, as [`Tilt::motion`] does.
+    #[inline(always)]
+    fn of([x, y]: &[AngleNodes<M>; 2]) -> Self {
+        let mut to = Self { omega: [[0.0; M]; 3], alpha: [[0.0; M]; 3], gravity: [[0.0; M]; 3] };
+        for i in 0..M {
+            let (sin_x, cos_x) = sin_cos(x.angle[i]);
+            let (sin_y, cos_y) = sin_cos(y.angle[i]);
+            let coupling = x.rate[i] * y.rate[i];
+            to.omega[0][i] = x.rate[i] * cos_y;
+            to.omega[1][i] = y.rate[i];
+            to.omega[2][i] = x.rate[i] * sin_y;
+            to.alpha[0][i] = x.acceleration[i] * cos_y - coupling * sin_y;
+            to.alpha[1][i] = y.acceleration[i];
+            to.alpha[2][i] = x.acceleration[i] * sin_y + coupling * cos_y;
+            to.gravity[0][i] = cos_x * sin_y * GRAVITY_M_S2;
+            to.gravity[1][i] = -sin_x * GRAVITY_M_S2;
+            to.gravity[2][i] = -cos_x * cos_y * GRAVITY_M_S2;
+        }
+        to
+    }
+
+    /// Returns the motion `plate`, which does not change.
+    #[inline]
+    pub(super) fn still(plate: &PlateMotion) -> Self {
+        let row = |value: f64| [value; M];
+        let rows = |v: &Vector3<f64>| [row(v.x), row(v.y), row(v.z)];
+        Self { omega: rows(&plate.omega), alpha: rows(&plate.alpha), gravity: rows(&plate.gravity) }
+    }
+
+    /// Adds an external force along x and y, given per mass, m/s².
+    #[inline]
+    pub(super) fn pushed(mut self, acceleration: Vector2<f64>) -> Self {
+        for axis in 0..2 {
+            for value in &mut self.gravity[axis] {
+                *value += acceleration[axis];
+            }
+        }
+        self
+    }
 }
 
 /// A constant force on the body's centre for a limited time.
@@ -58,6 +134,11 @@ impl Drive for Laws {
     #[inline]
     fn tilt(&self, t: f64) -> Tilt {
         Tilt::of(self.qx.at(t, self.inside), self.qy.at(t, self.inside))
+    }
+
+    #[inline]
+    fn nodes<const M: usize>(&self, at: &[f64; M]) -> PlateNodes<M> {
+        PlateNodes::of(&[self.qx.nodes(at, self.inside), self.qy.nodes(at, self.inside)])
     }
 
     fn push(&self) -> Vector2<f64> {

@@ -12,6 +12,13 @@ pub(super) trait DrivenModel<const N: usize>: System<N> {
     /// jump.
     const SMOOTH: bool;
 
+    /// Returns the longest step near the state `y` at which an implicit method does not
+    /// damp what grows, s.
+    #[inline]
+    fn longest_step_s(&self, _y: &[f64; N]) -> f64 {
+        f64::INFINITY
+    }
+
     /// Returns the motion that the state `y` represents at time `t`.
     fn motion(&self, t: f64, y: &[f64; N]) -> Motion;
 }
@@ -126,6 +133,11 @@ impl<D: Drive> Stiff<9> for DrivenCompliant<'_, D> {
 
 impl<D: Drive> DrivenModel<9> for DrivenCompliant<'_, D> {
     const SMOOTH: bool = false;
+
+    #[inline]
+    fn longest_step_s(&self, y: &[f64; 9]) -> f64 {
+        self.model.slip_growth_s(&Motion::from_row(y))
+    }
 
     fn motion(&self, _: f64, y: &[f64; 9]) -> Motion {
         Motion::from_row(y)

@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use super::drive::AngleNodes;
 use offbd_core::maths::sine::{self, sin_cos};
 use offbd_core::vocabulary::{Invalid, in_range, positive};
 
@@ -80,6 +81,34 @@ impl Law {
         sum
     }
 
+    /// Returns angle, rate and acceleration at the times `at`, as [`Self::at`].
+    #[must_use]
+    #[inline(always)]
+    pub fn nodes<const M: usize>(&self, at: &[f64; M], inside: f64) -> AngleNodes<M> {
+        let mut sum =
+            AngleNodes { angle: [self.constant; M], rate: [0.0; M], acceleration: [0.0; M] };
+        for term in &self.varying {
+            let mut add = |i: usize, [angle, rate, acceleration]: [f64; 3]| {
+                sum.angle[i] += angle;
+                sum.rate[i] += rate;
+                sum.acceleration[i] += acceleration;
+            };
+            match *term {
+                // Without a branch in the loop, which the compiler then vectorises.
+                Term::Sine { amplitude, frequency, phase } if in_reach(frequency, phase, at) => {
+                    let omega = TAU * frequency;
+                    for i in 0..M {
+                        let (sin, cos) = sin_cos(omega * at[i] + phase);
+                        let rate = amplitude * omega;
+                        add(i, [amplitude * sin, rate * cos, -rate * omega * sin]);
+                    }
+                }
+                _ => (0..M).for_each(|i| add(i, varying(term, at[i], inside))),
+            }
+        }
+        sum
+    }
+
     /// Returns whether the angle is constant in the smooth piece that contains `inside`.
     #[must_use]
     pub fn is_still(&self, inside: f64) -> bool {
@@ -112,6 +141,13 @@ impl Law {
         });
         times.fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Returns whether the argument of a sine is within the reach of [`sin_cos`] at all times
+/// `at`, in ascending order.
+#[inline]
+fn in_reach<const M: usize>(frequency: f64, phase: f64, at: &[f64; M]) -> bool {
+    [at[0], at[M - 1]].into_iter().all(|t| (TAU * frequency * t + phase).abs() <= sine::LIMIT_RAD)
 }
 
 #[inline]

@@ -259,8 +259,20 @@ impl<'a> SceneRunner<'a> {
     where
         W: for<'p> StepObserver<DrivenCompliant<'p, D>, 9>,
     {
+        let integration = self.integration(self.scene.initial.to_row(), samples);
+        self.compliant_on(integration, drive, observer)
+    }
+
+    fn compliant_on<D: Drive, W>(
+        &self,
+        mut integration: Integration<'_, '_, 9>,
+        drive: &mut D,
+        observer: &mut W,
+    ) -> Result<RunOutcome, Failure>
+    where
+        W: for<'p> StepObserver<DrivenCompliant<'p, D>, 9>,
+    {
         let model = self.scene.compliant();
-        let mut integration = self.integration(self.scene.initial.to_row(), samples);
         let (mut control, budget) = (self.control(drive), self.budget());
         let motion = |_: &D, _: f64, y: &[f64; 9]| Motion::from_row(y);
         let end = self.pieces(drive, &mut integration, motion, |drive, integration, until| {
@@ -269,6 +281,19 @@ impl<'a> SceneRunner<'a> {
             self.stiff(&system, integration, until, (&mut control, &budget), observer)
         })?;
         Ok(RunOutcome { end, statistics: integration.statistics, events: Vec::new() })
+    }
+
+    /// Runs the compliant model from the motion `start` at `from_s` on, without a sample
+    /// there unless it is 0.
+    pub(super) fn compliant_from<D: Drive>(
+        &self,
+        from_s: f64,
+        start: &Motion,
+        drive: &mut D,
+        samples: Option<&mut Samples<'_>>,
+    ) -> Result<RunOutcome, Failure> {
+        let integration = Integration { t: from_s, ..self.integration(start.to_row(), samples) };
+        self.compliant_on(integration, drive, &mut NoObserver)
     }
 
     /// Integrates one piece by an explicit method.

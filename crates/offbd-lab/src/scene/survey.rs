@@ -183,7 +183,7 @@ fn creeping_share(ball: &Ball) -> f64 {
     ball.inertia_factor() / (1.0 + ball.inertia_factor())
 }
 
-fn starts_rolling(scene: &Scene) -> bool {
+pub(super) fn starts_rolling(scene: &Scene) -> bool {
     let (body, at): (_, &Motion) = (scene.body(), &scene.initial);
     let depth = body.rest_height_m() - at.position.z;
     let [x, y] = body.slip(&at.velocity, &at.spin);

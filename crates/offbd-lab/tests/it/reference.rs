@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use nalgebra::Vector2;
 use offbd_core::plant::{Ball, Contact, Motion, Plate};
 use offbd_lab::scene::{
-    Configuration, Law, Laws, Method, Model, Pace, Samples, Scene, Subject, Term, choose, run,
+    Configuration, Law, Laws, Method, Model, OnePass, Pace, Push, Samples, Scene, Subject, Term,
+    choose, one_pass, run,
 };
 
 /// Times and positions, x and y; without a column y, the motion is along x only.
@@ -186,6 +187,96 @@ fn validate_the_choice_on_a_gentle_plate() {
         let off = apart(&positions(&scene, &chosen, 0.01), &truth);
         assert!(off <= 1e-3, "{amplitude} rad, {frequency} Hz: {off:e} m");
     }
+}
+
+/// Returns the positions of a run in one pass at regular times, and the run.
+fn in_one_pass(
+    (scene, laws): &(Scene, Laws),
+    tolerance_m: f64,
+    every: f64,
+) -> (Vec<Vector2<f64>>, OnePass) {
+    let mut path = Vec::new();
+    let mut sink = |_: f64, at: &Motion| path.push(at.position.xy());
+    let mut samples = Samples::new(every, &mut sink);
+    let run = one_pass(scene, &mut laws.clone(), tolerance_m, Some(&mut samples)).unwrap();
+    (path, run)
+}
+
+#[test]
+fn validate_one_pass_on_every_scene() {
+    for name in SCENES {
+        let (scene, truth) = (scene(name), track(&format!("compliant-{name}")));
+        let positions: Vec<_> = truth.iter().map(|(_, at)| *at).collect();
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+            let (path, run) = in_one_pass(&scene, tolerance, truth[1].0);
+            let off = apart(&path, &positions);
+            assert!(off <= tolerance, "{name} at {tolerance:e} m is off by {off:e} m: {run:?}");
+            let on_the_plate = run.most_accurate().0 != "compliant";
+            assert!(
+                !on_the_plate || run.error_m <= tolerance,
+                "{name} at {tolerance:e} m: {run:?}"
+            );
+            let unsampled = one_pass(&scene.0, &mut scene.1.clone(), tolerance, None).unwrap();
+            assert_eq!(unsampled, run, "{name}: samples change the run");
+        }
+    }
+}
+
+/// A ball that rolls is never handed to the contact model, except for the finest tolerance.
+#[test]
+fn one_pass_uses_no_more_model_than_a_scene_needs() {
+    let last = |name: &str, tolerance| {
+        let (scene, laws) = scene(name);
+        one_pass(&scene, &mut laws.clone(), tolerance, None).unwrap().most_accurate().0
+    };
+    assert_eq!(["slope", "sine"].map(|name| last(name, 1e-2)), ["rolling"; 2]);
+    assert_eq!(["sine", "sine-soft"].map(|name| last(name, 1e-6)), ["creeping", "sagging"]);
+    assert_eq!(["steep", "steep-soft"].map(|name| last(name, 1e-2)), ["compliant"; 2]);
+}
+
+/// Windows end at the plate's edge: the ball falls where the contact model says.
+#[test]
+fn validate_one_pass_over_the_edge_and_after_a_push() {
+    let mut tilted = on_the_chapters_plate(Contact::CHAPTER, 0.8);
+    tilted.edges = true;
+    let tilt = Law::new(&[Term::Constant(0.2)]);
+    let falls = (tilted, Laws::new(tilt, Law::default(), Vec::new()));
+    let push = Push { force: Vector2::new(0.02, -0.05), start_s: 0.3, duration_s: 0.1 };
+    let swing = Law::new(&[Term::Sine { amplitude: 0.03, frequency: 0.8, phase: 0.2 }]);
+    let pushed = on_the_chapters_plate(Contact::CHAPTER, 1.0);
+    let pushed = (pushed, Laws::new(swing.clone(), swing, vec![push]));
+    for scene in [falls, pushed] {
+        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
+        let truth = positions(&scene, &tight, 0.01);
+        for tolerance in [1e-3, 1e-5] {
+            let (path, run) = in_one_pass(&scene, tolerance, 0.01);
+            let off = apart(&path, &truth);
+            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}");
+        }
+    }
+}
+
+/// On random scenes one pass keeps the tolerance, compared with RODAS at 1e-10 m.
+#[test]
+fn validate_one_pass_on_scenes_at_random() {
+    let mut dice = Dice(0x2545_F491_4F6C_DD1D);
+    for _ in 0..60 {
+        let scene = dice.scene();
+        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
+        let truth = positions(&scene, &tight, 0.003);
+        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+            let (path, run) = in_one_pass(&scene, tolerance, 0.003);
+            let off = apart(&path, &truth);
+            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}, {scene:?}");
+        }
+    }
+}
+
+#[test]
+fn one_pass_declines_what_rounding_forbids() {
+    let (scene, laws) = scene("steep");
+    let declined = one_pass(&scene, &mut laws.clone(), 1e-12, None).unwrap_err().to_string();
+    assert!(declined.starts_with("no model keeps 1e-12 m here: "), "{declined}");
 }
 
 #[test]

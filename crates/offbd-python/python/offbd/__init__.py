@@ -163,8 +163,8 @@ def scene(
     tolerance_m: float = 1e-4,
     sample_s: float = 0.01,
 ) -> SceneRun:
-    """Runs a scene file, as `offbd scene` does. Without a model, the cheapest model and method
-    that meet the tolerance run.
+    """Runs a scene file, as `offbd scene` does. Without a model, one pass starts on the cheapest
+    and changes to better ones where the tolerance asks for it; the run names the last of them.
     """
     text = _asset_text(description)
     assert text is not None

@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 use super::ChartedScene;
 use super::record::WorkPrecisionRecord;
-use crate::scene::{Configuration, Failure, Method, Model, Pace, Samples, choose, run};
+use crate::scene::{Configuration, Failure, Method, Model, Pace, Samples, one_pass, run};
 use crate::timing::{CpuTime, cpu_time};
 use offbd_core::plant::Motion;
 
@@ -22,7 +22,7 @@ pub(super) const STEPS_S: [f64; 13] =
 /// Tolerances charted, m.
 pub(super) const TOLERANCES_M: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
-/// Accuracies requested from the automatic choice, m.
+/// Accuracies requested from runs in one pass, m.
 pub(super) const ASKED_M: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /// A scene with its reference solution, on which configurations are measured.
@@ -66,21 +66,35 @@ impl SceneBenchmark {
             note,
             front: false,
             asked_m: None,
-            choosing_us_per_s: None,
         }
     }
 
-    /// Measures the automatic choice for `asked_m`; `None` if no candidate meets it.
-    pub(super) fn chosen(&self, asked_m: f64) -> Option<WorkPrecisionRecord> {
-        let ChartedScene { scene, laws, .. } = &self.charted;
-        let choice = choose(scene, laws, asked_m).ok()?;
-        let choosing = cpu_time(1, || {
-            let _ = choose(scene, laws, asked_m);
+    /// Measures a run in one pass within `asked_m`; `None` if it is declined. The cost is that
+    /// of everything: there is nothing to choose before.
+    pub(super) fn in_one_pass(&self, asked_m: f64) -> Option<WorkPrecisionRecord> {
+        let ChartedScene { name, scene, laws } = &self.charted;
+        let mut path = Vec::new();
+        let mut sink = |_: f64, at: &Motion| path.push(at.position.xy());
+        let mut samples = Samples::new(scene.duration_s / COMPARED, &mut sink);
+        let mut laws = laws.clone();
+        let run = one_pass(scene, &mut laws, asked_m, Some(&mut samples)).ok()?;
+        let cost = cpu_time(self.repeats, || {
+            let _ = std::hint::black_box(one_pass(scene, &mut laws, asked_m, None));
         });
+        let models: Vec<&str> = run.stages.iter().map(|stage| stage.model).collect();
         Some(WorkPrecisionRecord {
+            scene: name.clone(),
+            engine: "offbd".to_owned(),
+            model: models.join(", "),
+            method: "one-pass".to_owned(),
+            setting: "tolerance_m".to_owned(),
+            value: asked_m,
+            error_m: Some(self.error(&path)),
+            cpu_us_per_s: Some(cost.us_per_s(scene.duration_s)),
+            spread: Some(cost.spread()),
+            note: None,
+            front: false,
             asked_m: Some(asked_m),
-            choosing_us_per_s: Some(choosing.us_per_s(scene.duration_s)),
-            ..self.record(&choice.configuration)
         })
     }
 

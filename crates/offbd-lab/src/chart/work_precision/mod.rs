@@ -1,5 +1,5 @@
 //! Work–precision diagrams: speed against accuracy of every model by every method at
-//! several paces, on six scenes, with the automatic choice and, if given, other engines.
+//! several paces, on six scenes, with runs in one pass and, if given, other engines.
 //!
 //! The error is the largest distance in the plate's plane from the reference solution, the
 //! compliant model at a fine tolerance. The cost is the CPU time of a run without samples,
@@ -41,7 +41,7 @@ pub fn make(effort: Effort, scenes: Vec<ChartedScene>, peers: &Peers) -> Result<
         let mut records: Vec<WorkPrecisionRecord> =
             all.iter().map(|c| benchmark.record(c)).collect();
         mark_front(&mut records);
-        records.extend(ASKED_M.iter().filter_map(|&asked| benchmark.chosen(asked)));
+        records.extend(ASKED_M.iter().filter_map(|&asked| benchmark.in_one_pass(asked)));
         ours.append(&mut records);
     }
     let figures = show::figures(&ours, &peers.records);

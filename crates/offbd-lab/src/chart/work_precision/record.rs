@@ -31,12 +31,9 @@ pub struct WorkPrecisionRecord {
     /// Whether it is on the Pareto front of offbd's records on this scene.
     #[serde(default)]
     pub front: bool,
-    /// The requested accuracy, m, of an automatic choice.
+    /// The requested accuracy, m, of a run in one pass.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked_m: Option<f64>,
-    /// CPU time of choosing per simulated second, µs/s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub choosing_us_per_s: Option<f64>,
 }
 
 impl WorkPrecisionRecord {

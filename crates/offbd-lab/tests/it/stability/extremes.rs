@@ -4,7 +4,7 @@
 use super::scenes::{compliant, s1, s3, scene};
 use offbd_core::plant::Contact;
 use offbd_lab::scene::{
-    Configuration, Failure, Laws, Method, Model, Pace, RunOutcome, Scene, choose, run,
+    Configuration, Failure, Laws, Method, Model, Pace, RunOutcome, Scene, choose, one_pass, run,
 };
 use proptest::prelude::*;
 
@@ -97,6 +97,17 @@ fn a_choice_or_a_reason_on_any_contact() {
     }
     println!("chosen {chosen}, refused {refused}");
     assert!(chosen > 100, "{chosen} chosen, {refused} refused");
+}
+
+#[test]
+fn one_pass_ends_in_a_number_on_any_contact() {
+    for contact in grid() {
+        let scene = scene(contact, 0.05);
+        for laws in &laws() {
+            let run = one_pass(&scene, &mut laws.clone(), 1e-3, None).unwrap();
+            assert!(run.end.to_row().iter().all(|value| value.is_finite()), "{contact:?}");
+        }
+    }
 }
 
 proptest! {

@@ -1,0 +1,603 @@
+//! Runs a scene in one pass within a wanted accuracy, without a reference and without a
+//! search.
+//!
+//! The run starts on the cheapest model. While it goes, a bound of its error is carried
+//! along: what the model leaves out, what the method leaves out, and how the linearised
+//! motion lets both grow until the end. Where the bound would be exceeded, the next
+//! better model takes over, from the same state:
+//!
+//! 1. The ball rolls, creeps or sags (`window.rs`): Gauss–Legendre windows of up to one
+//!    period of the plate, from 4 to 24 nodes.
+//! 2. Where it slips, flies or passes the edge, the compliant model by RODAS.
+
+mod bound;
+mod nodes;
+mod window;
+
+use nalgebra::Vector3;
+
+use super::configuration::{Configuration, Method, Model, Pace};
+use super::drive::{Drive, DrivenPlate, PlateNodes};
+use super::run::SceneRunner;
+use super::samples::Samples;
+use super::stepping::{MOST_STEPS, RunStatistics};
+use super::survey::starts_rolling;
+use super::{Scene, Subject};
+use crate::models::Creeping;
+use bound::ErrorBound;
+use nodes::{EIGHT, FOUR, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
+use offbd_core::plant::{Ball, Motion};
+use window::{BallOnPlate, Path, Rung, SagDecay, State, Window};
+
+/// A stretch of a run with one model and one method.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage {
+    pub from_s: f64,
+    pub model: &'static str,
+    pub method: &'static str,
+    /// Why this model begins here.
+    pub why: &'static str,
+}
+
+/// The result of a run in one pass.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OnePass {
+    pub end: Motion,
+    /// Bound of the largest error of the position (x, y), m.
+    pub error_m: f64,
+    pub stages: Vec<Stage>,
+    pub statistics: RunStatistics,
+}
+
+impl OnePass {
+    /// Returns the names of the model and the method of the last, most accurate stage.
+    #[must_use]
+    pub fn most_accurate(&self) -> (&'static str, &'static str) {
+        self.stages.last().map_or(("", ""), |stage| (stage.model, stage.method))
+    }
+}
+
+/// No way to keep the tolerance.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("no model keeps {tolerance_m:e} m here: {why}")]
+pub struct Declined {
+    pub tolerance_m: f64,
+    pub why: String,
+}
+
+/// Tolerance of RODAS as a share of the wanted accuracy, and at most, m. Chosen: on random
+/// scenes RODAS errs by up to 3.4 times its tolerance, and above 1e-4 m it misses that a
+/// ball just leaves the plate.
+const CONTACT_SHARE: f64 = 0.1;
+const COARSEST_M: f64 = 1e-4;
+
+/// Share of the wanted accuracy for the windows before the ball leaves the plate; chosen.
+const WINDOWS_SHARE: f64 = 0.5;
+
+/// Attempts at ever finer windows; chosen.
+const ATTEMPTS: u32 = 3;
+
+/// Share of the tolerance that a repetition takes of the one that would have sufficed, and
+/// its least share of the last one; chosen.
+const REFINED: f64 = 0.5;
+const LEAST_REFINED: f64 = 1e-3;
+
+/// Runs `scene` under `drive` so that the position (x, y) stays within `tolerance_m`, in
+/// [1e-12, 1], of the compliant model's, and passes samples to `samples`.
+///
+/// # Errors
+/// [`Declined`] if no model keeps the tolerance; samples taken until then remain valid.
+pub fn one_pass<D: Drive + Clone>(
+    scene: &Scene,
+    drive: &mut D,
+    tolerance_m: f64,
+    mut samples: Option<&mut Samples<'_>>,
+) -> Result<OnePass, Declined> {
+    let left = match on_the_plate(scene, drive, tolerance_m, samples.as_deref_mut()) {
+        Ok(run) => return Ok(run),
+        Err(left) => left,
+    };
+    let declined = |why: String| Declined { tolerance_m, why };
+    let pace = Pace::Tolerance((tolerance_m * CONTACT_SHARE).min(COARSEST_M));
+    let by = Configuration::new(Model::Compliant, Method::Rodas4, pace)
+        .map_err(|invalid| declined(invalid.reason))?;
+    let HandOver { at_s: from_s, motion, why, error_m, mut stages, statistics: before } = left;
+    let run = SceneRunner::new(MOST_STEPS, scene, &by)
+        .compliant_from(from_s, &motion, drive, samples)
+        .map_err(|failure| declined(failure.to_string()))?;
+    stages.push(Stage { from_s, model: Model::Compliant.name(), method: by.method().name(), why });
+    let error_m = error_m + run.statistics.method_error_m;
+    let statistics = RunStatistics {
+        steps: before.steps + run.statistics.steps,
+        rejected: before.rejected + run.statistics.rejected,
+        method_error_m: error_m,
+    };
+    Ok(OnePass { end: run.end, error_m, stages, statistics })
+}
+
+/// The state at which the ball leaves the models on the plate.
+struct HandOver {
+    at_s: f64,
+    motion: Motion,
+    why: &'static str,
+    /// Bound of the error that it has until the end, m.
+    error_m: f64,
+    stages: Vec<Stage>,
+    statistics: RunStatistics,
+}
+
+impl HandOver {
+    /// Begins with the contact.
+    fn at_once(scene: &Scene, why: &'static str) -> Self {
+        let (motion, statistics) = (scene.initial, RunStatistics::default());
+        Self { at_s: 0.0, motion, why, error_m: 0.0, stages: Vec::new(), statistics }
+    }
+}
+
+/// Runs the models on the plate, with windows fine enough for the bound at the end.
+fn on_the_plate<D: Drive + Clone>(
+    scene: &Scene,
+    drive: &mut D,
+    tolerance_m: f64,
+    samples: Option<&mut Samples<'_>>,
+) -> Result<OnePass, HandOver> {
+    let Subject::Ball(ball) = &scene.subject else {
+        return Err(HandOver::at_once(scene, "a block slides"));
+    };
+    if !starts_rolling(scene) {
+        let why = "the ball does not start rolling on the plate";
+        return Err(HandOver::at_once(scene, why));
+    }
+    let (start, mut target_m) = (drive.clone(), tolerance_m);
+    for _ in 0..ATTEMPTS {
+        // What may have to be repeated takes no samples.
+        let mut pass = Pass::new(scene, ball, drive, target_m);
+        let tried = pass.roll(None);
+        let (error_m, share) = (pass.bound_m(), if tried.is_ok() { 1.0 } else { WINDOWS_SHARE });
+        let within = share * tolerance_m / error_m;
+        if within >= 1.0 {
+            let mut tried = tried;
+            if let Some(samples) = samples {
+                *drive = start;
+                pass = Pass::new(scene, ball, drive, target_m);
+                tried = pass.roll(Some(samples));
+            }
+            return match tried {
+                Ok(end) => Ok(pass.run(end)),
+                Err(left) => Err(pass.left(left)),
+            };
+        }
+        *drive = start.clone();
+        target_m *= REFINED * within.max(LEAST_REFINED);
+    }
+    Err(HandOver::at_once(scene, "errors grow too fast on the plate"))
+}
+
+/// Numbers of nodes of a window, in ascending order.
+const SIZES: [usize; 5] = [4, 8, 12, 16, 24];
+
+/// Index into [`SIZES`] of the first windows, of one period of the plate, by the wanted
+/// accuracy, m; measured on the scene *sine*.
+fn first_size(tolerance_m: f64) -> usize {
+    if tolerance_m >= 1e-3 {
+        1
+    } else if tolerance_m >= 1e-5 {
+        2
+    } else {
+        3
+    }
+}
+
+/// Longest window of the sagging ball, in decays of its slow sag; chosen so that 16 nodes
+/// resolve the decay to 1e-9.
+const DECAYS: f64 = 4.0;
+
+/// Shares of the wanted accuracy for what a model leaves out, for lags, for the method and
+/// for sweeps; chosen.
+const MODEL_SHARE: f64 = 0.4;
+const LAG_SHARE: f64 = 0.2;
+const METHOD_SHARE: f64 = 0.3;
+const SWEEP_SHARE: f64 = 0.03;
+
+/// Maximum friction demand of a ball that rolls, as a share of the limit; chosen below 1
+/// as a margin between the nodes.
+const SURE_TO_ROLL: f64 = 0.9;
+
+/// Shortest window, as a share of the plate's shortest time, before the contact model
+/// takes over; chosen.
+const SHORTEST_PART: f64 = 1.0 / 16.0;
+
+/// Share of the square of the growth rate kept from earlier windows; chosen.
+const REMEMBERED: f64 = 0.5;
+
+/// A run on the plate in progress.
+struct Pass<'a, D> {
+    scene: &'a Scene,
+    drive: &'a mut D,
+    ball: BallOnPlate,
+    creeping: Creeping,
+    /// The windows' tolerance, m.
+    target: f64,
+    t: f64,
+    state: State,
+    /// Start of the current piece, s, with the motion there: creep and sag are still those
+    /// of the piece before.
+    entered: (f64, Motion),
+    /// Normal force per mass that the contact carries, m/s².
+    carried: f64,
+    rung: Rung,
+    size: usize,
+    /// Recent mean square of the rate at which errors grow, 1/s².
+    square: f64,
+    bound: ErrorBound,
+    stages: Vec<Stage>,
+    statistics: RunStatistics,
+}
+
+/// What came of a window.
+enum Tried {
+    Taken,
+    /// The window is too long for its nodes.
+    TooCoarse,
+    /// The ball does not stay on the plate, or does not roll.
+    Leaves(&'static str),
+}
+
+impl<'a, D: Drive> Pass<'a, D> {
+    fn new(scene: &'a Scene, ball: &Ball, drive: &'a mut D, target: f64) -> Self {
+        Self {
+            scene,
+            drive,
+            ball: BallOnPlate::new(ball, &scene.plate, &scene.contact),
+            creeping: scene.creeping(ball),
+            target,
+            t: 0.0,
+            state: [0.0; 6],
+            entered: (0.0, scene.initial),
+            carried: 0.0,
+            rung: Rung::Rolling,
+            size: first_size(target),
+            square: 0.0,
+            bound: ErrorBound::default(),
+            stages: Vec::new(),
+            statistics: RunStatistics::default(),
+        }
+    }
+
+    /// Returns the bound of the error, until the end of the scene, m.
+    fn bound_m(&self) -> f64 {
+        self.bound.after(self.scene.duration_s - self.t)
+    }
+
+    fn run(self, end: Motion) -> OnePass {
+        let error_m = self.bound_m();
+        let statistics = RunStatistics { method_error_m: error_m, ..self.statistics };
+        OnePass { end, error_m, stages: self.stages, statistics }
+    }
+
+    fn left(self, left: HandOver) -> HandOver {
+        HandOver { error_m: self.bound_m(), stages: self.stages, ..left }
+    }
+
+    /// Runs until the end, or until the ball does not stay on the plate.
+    fn roll(&mut self, mut samples: Option<&mut Samples<'_>>) -> Result<Motion, HandOver> {
+        let end = self.scene.duration_s;
+        let initial = self.scene.initial;
+        let mut until = self.drive.begin(0.0, &initial).min(end);
+        let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), 0.0).at(0.0);
+        let [x, y, u, v, w] = self.creeping.enter(&initial, &plate);
+        self.state = [x, y, u, v, w, self.scene.body().rest_height_m() - initial.position.z];
+        if let Some(samples) = samples.as_deref_mut() {
+            samples.take(0.0, |_| initial);
+        }
+        self.carried = self.ball.carried(self.state[5]);
+        self.enter(Rung::Rolling);
+        loop {
+            self.piece(until, samples.as_deref_mut())?;
+            if self.t >= end {
+                return Ok(self.motion());
+            }
+            self.entered = (self.t, self.motion());
+            until = self.drive.begin(self.t, &self.entered.1).min(end);
+        }
+    }
+
+    fn enter(&mut self, rung: Rung) {
+        self.rung = rung;
+        let (from_s, method) = (self.t, "collocation");
+        let (model, why) = match rung {
+            Rung::Rolling => ("rolling", "the cheapest model"),
+            Rung::Creeping => ("creeping", "creep and sag of the contact count"),
+            Rung::Sagging => ("sagging", "the sag lags behind its load"),
+        };
+        // A better model from the same time on replaces the cheaper one.
+        self.stages.pop_if(|stage| stage.from_s == from_s);
+        self.stages.push(Stage { from_s, model, method, why });
+    }
+
+    /// Returns the ball's motion now.
+    fn motion(&self) -> Motion {
+        let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), self.t).at(self.t);
+        let y: [f64; 5] = std::array::from_fn(|i| self.state[i]);
+        let mut at = self.creeping.leave(&y, &plate);
+        if let Some([slow, fast]) = self.ball.decay {
+            let settled = self.scene.body().rest_height_m() - at.position.z;
+            let lag = settled - self.state[5];
+            let sag = self.state[5] - slow / fast * lag;
+            let turn = 2.0 * self.ball.share * (sag - settled);
+            at.position.z = self.scene.body().rest_height_m() - sag;
+            at.velocity += Vector3::new(turn * plate.omega.y, -turn * plate.omega.x, -slow * lag);
+            at.spin +=
+                Vector3::new(turn * plate.omega.x, turn * plate.omega.y, 0.0) / self.ball.radius;
+        }
+        at
+    }
+
+    /// Runs one piece of the drive, up to `until`.
+    fn piece(&mut self, until: f64, mut samples: Option<&mut Samples<'_>>) -> Result<(), HandOver> {
+        let time = self.drive.shortest_time_s();
+        let still = self.drive.is_still();
+        let mut longest = if still { f64::INFINITY } else { time };
+        let mut size = if still { 0 } else { self.size };
+        while self.t < until {
+            let sags = self.rung == Rung::Sagging && !still;
+            if let (true, Some([slow, _])) = (sags, self.ball.decay) {
+                longest = longest.min(DECAYS / slow);
+                size = size.max(3);
+            }
+            let left = until - self.t;
+            let n = (left / longest - 1e-9).ceil().max(1.0);
+            let half = left / n / 2.0;
+            let last = n == 1.0;
+            let end = if last { until } else { self.t + 2.0 * half };
+            let samples = samples.as_deref_mut();
+            let tried = match size {
+                0 => self.window(&FOUR, half, end, still, last, samples),
+                1 => self.window(&EIGHT, half, end, still, last, samples),
+                2 => self.window(&TWELVE, half, end, still, last, samples),
+                3 => self.window(&SIXTEEN, half, end, still, last, samples),
+                _ => self.window(&TWENTY_FOUR, half, end, still, last, samples),
+            };
+            match tried {
+                Tried::Taken => self.statistics.steps += 1,
+                Tried::TooCoarse if size + 1 < SIZES.len() => {
+                    self.statistics.rejected += 1;
+                    size += 1;
+                    self.size = size;
+                }
+                Tried::TooCoarse | Tried::Leaves(_)
+                    if half * 2.0 > SHORTEST_PART * time.min(self.scene.duration_s) =>
+                {
+                    self.statistics.rejected += 1;
+                    longest = half;
+                }
+                Tried::Leaves(why) => return Err(self.hand_over(why)),
+                Tried::TooCoarse => {
+                    return Err(self.hand_over("the motion is too fast for windows"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn hand_over(&self, why: &'static str) -> HandOver {
+        let (entered_s, entered) = self.entered;
+        HandOver {
+            at_s: self.t,
+            motion: if self.t == entered_s { entered } else { self.motion() },
+            why,
+            error_m: 0.0,
+            stages: Vec::new(),
+            statistics: self.statistics,
+        }
+    }
+
+    /// Tries the window up to `end` with these nodes.
+    #[inline(always)]
+    fn window<const M: usize>(
+        &mut self,
+        nodes: &Nodes<M>,
+        half: f64,
+        end: f64,
+        still: bool,
+        last: bool,
+        samples: Option<&mut Samples<'_>>,
+    ) -> Tried {
+        let (length, left) = (2.0 * half, self.scene.duration_s - self.t);
+        let push = self.drive.push() / self.scene.body().mass_kg();
+        let plate = if still {
+            PlateNodes::still(&self.drive.tilt(self.t).motion())
+        } else {
+            self.drive.nodes(&nodes.at.map(|s| self.t + half * (1.0 + s)))
+        };
+        let window = Window { nodes, plate: plate.pushed(push), start: self.state, half };
+        // Allowed error per second of the scene, m/s.
+        let allowed = self.target / self.scene.duration_s;
+        let [_, over] = bound::growth(self.square, left);
+        let settled = SWEEP_SHARE * allowed / (left * over);
+        let mut path = self.ball.guess(&window.plate);
+        let mut rung = if still { self.rung.min(Rung::Creeping) } else { self.rung };
+        let mut added;
+        loop {
+            let decay = (rung == Rung::Sagging)
+                .then(|| self.ball.decay.map(|decay| SagDecay::new(nodes, decay, half)))
+                .flatten();
+            self.ball.sweep(&window, rung, decay.as_ref(), settled, &mut path);
+            if path.worst.demand.is_nan() || path.worst.demand >= SURE_TO_ROLL {
+                let flies = path.worst.demand == f64::INFINITY;
+                return Tried::Leaves(if flies { "the ball flies" } else { "the ball slips" });
+            }
+            if path.unsettled > settled || path.unsettled.is_nan() {
+                return Tried::TooCoarse;
+            }
+            if let Some(why) = self.ends(&path, still, [self.t, end], last) {
+                return Tried::Leaves(why);
+            }
+            let square = path.worst.growth.max(self.square);
+            let [same, over] = bound::growth(square, left);
+            added = bound::WindowError::default();
+            let model = match rung {
+                Rung::Rolling => {
+                    let [offset, acceleration] = self.ball.left_out(&path.worst);
+                    added.position = offset * length;
+                    added.velocity = acceleration * length;
+                    let rate = offset * same + acceleration * left * over;
+                    rate <= MODEL_SHARE * allowed
+                }
+                Rung::Creeping | Rung::Sagging => {
+                    let sags = rung == Rung::Sagging;
+                    let [passing, velocity] = if sags {
+                        self.ball.sagging_lag(&path.worst, self.state[5])
+                    } else {
+                        self.ball.creeping_lag(&path.worst, self.state[5])
+                    };
+                    // A lag is a displacement, which then grows as others do.
+                    added.velocity = velocity + path.worst.growth * length * passing;
+                    added.passing = passing;
+                    let most = if sags { MODEL_SHARE } else { LAG_SHARE } * self.target;
+                    passing * same + velocity * left * over <= most
+                }
+            };
+            if model {
+                break;
+            }
+            rung = match rung {
+                Rung::Rolling => Rung::Creeping,
+                Rung::Creeping if self.ball.decay.is_some() && !still => Rung::Sagging,
+                _ => return Tried::Leaves("the contact settles too slowly"),
+            };
+            if rung == Rung::Sagging && M < 16 {
+                self.enter(rung);
+                return Tried::TooCoarse;
+            }
+        }
+        let (tail, inside) = tails(nodes, &path, half);
+        let square = path.worst.growth.max(self.square);
+        let [same, over] = bound::growth(square, left);
+        let local = (tail[1] * left * over + tail[0]) * same.max(1.0);
+        if !(local <= METHOD_SHARE * allowed * length && inside <= METHOD_SHARE * self.target) {
+            return Tried::TooCoarse;
+        }
+        added.position += tail[0];
+        added.velocity += tail[1] + path.unsettled * length;
+        added.passing += inside;
+        if self.t == self.entered.0 {
+            // The plate's acceleration jumps here, the force of the contact does not.
+            let settling = self.ball.settling(&path.worst, self.carried);
+            if settling * same > LAG_SHARE * self.target {
+                return Tried::Leaves("the ball slips while the contact settles");
+            }
+            added.position += settling;
+        }
+        self.take(&window, &path, rung, end, added, samples);
+        Tried::Taken
+    }
+
+    /// Returns why the ball leaves the plate, or slips, where the nodes do not show it: at
+    /// an edge of the plate, or where a piece of the drive begins or ends, at which its
+    /// acceleration is often largest.
+    #[inline]
+    fn ends<const M: usize>(
+        &self,
+        path: &Path<M>,
+        still: bool,
+        [from, end]: [f64; 2],
+        last: bool,
+    ) -> Option<&'static str> {
+        if self.scene.edges {
+            let ground = self.scene.ground();
+            let [x, y] = &path.position;
+            let within = (0..M).all(|i| ground.margin_m(x[i], y[i]) > self.target)
+                && ground.margin_m(path.end[0], path.end[1]) > self.target;
+            if !within {
+                return Some("the ball passes the edge");
+            }
+        }
+        let slips = |first: bool, t, state| first && self.slips_at(t, state);
+        let begins = from == self.entered.0;
+        (!still && (slips(begins, from, &self.state) || slips(last, end, &path.end)))
+            .then_some("the ball slips")
+    }
+
+    /// Returns whether a ball in this state would slip or fly.
+    fn slips_at(&self, t: f64, state: &State) -> bool {
+        let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), t).at(t);
+        let y: [f64; 5] = std::array::from_fn(|i| state[i]);
+        let demand = self.creeping.rolling().grip(&y, &plate).demand(self.ball.friction);
+        demand.is_nan() || demand >= SURE_TO_ROLL
+    }
+
+    /// Takes the window that ends at `end`.
+    #[inline(always)]
+    fn take<const M: usize>(
+        &mut self,
+        window: &Window<'_, M>,
+        path: &Path<M>,
+        rung: Rung,
+        end: f64,
+        added: bound::WindowError,
+        samples: Option<&mut Samples<'_>>,
+    ) {
+        if rung > self.rung {
+            self.enter(rung);
+        }
+        self.carried = path.worst.last_normal;
+        self.bound.carry(path.worst.growth, 2.0 * window.half, &added);
+        self.square = path.worst.growth.max(REMEMBERED * self.square);
+        if let Some(samples) = samples {
+            let (start, half) = (self.t, window.half);
+            samples.take(end, |within| {
+                let s = within.map_or(1.0, |t| (t - start) / half - 1.0);
+                self.sample(window, path, s)
+            });
+        }
+        (self.t, self.state) = (end, path.end);
+    }
+
+    /// Returns the motion at `s`, from −1 to 1, in a window.
+    fn sample<const M: usize>(&self, window: &Window<'_, M>, path: &Path<M>, s: f64) -> Motion {
+        let Window { nodes, start, half, .. } = window;
+        let value = |f: &[f64; M]| nodes.value_and_integral(f, s)[0];
+        let along = [0, 1].map(|a| {
+            let [velocity, integral] = nodes.value_and_integral(&path.velocity(a), s);
+            (start[a] + half * integral, velocity, velocity + value(&path.slip[a]))
+        });
+        let height = self.scene.body().rest_height_m();
+        let r = self.ball.radius;
+        Motion {
+            position: Vector3::new(along[0].0, along[1].0, height - value(&path.sag)),
+            velocity: Vector3::new(along[0].1, along[1].1, 0.0),
+            spin: Vector3::new(-along[1].2 / r, along[0].2 / r, value(&path.free[2])),
+        }
+    }
+}
+
+/// Returns estimates of what the series of a window leaves out: of position, m, and of
+/// velocity, m/s, at its end, and of positions within it, m.
+///
+/// At the end, Gauss's quadrature is exact up to degree 2M − 1: its error is that of a
+/// series of twice the length.
+#[inline(always)]
+fn tails<const M: usize>(nodes: &Nodes<M>, path: &Path<M>, half: f64) -> ([f64; 2], f64) {
+    let (mut end, mut inside) = ([0.0; 2], 0.0_f64);
+    for a in 0..2 {
+        let [rate, at_end] = tail(nodes, &path.rate[a]);
+        end[1] += at_end * 2.0 * half;
+        inside = inside.max(4.0 * rate * half * half / (M * M) as f64);
+        let [offset, at_end] = tail(nodes, &path.offset[a]);
+        end[0] += at_end * 2.0 * half;
+        inside = inside.max(2.0 * offset * half / M as f64);
+    }
+    end[0] += end[1] * half;
+    (end, inside)
+}
+
+/// Returns the size of the last Legendre coefficients of `f`, and of those that would
+/// follow after as many again.
+#[inline(always)]
+fn tail<const M: usize>(nodes: &Nodes<M>, f: &[f64; M]) -> [f64; 2] {
+    let [last, before, middle] = [M - 1, M - 2, M / 2 - 1].map(|n| nodes.coefficient(n, f).abs());
+    let top = last.max(before);
+    let fall = (top / middle.max(f64::MIN_POSITIVE)).min(1.0);
+    [top, top * fall * fall]
+}
