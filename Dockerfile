@@ -1,4 +1,5 @@
-# Builds with BuildKit (the cache mounts need it): docker build -t offbd .
+# Builds with BuildKit (the cache mounts need it):
+# docker build --build-arg OFFBD_COMMIT=$(git rev-parse --short=12 HEAD) -t offbd .
 # Runs: docker run -p 127.0.0.1:8087:8087 -v offbd:/var/lib/offbd offbd
 # The service requires a token; make the first one with
 # docker run --rm -v offbd:/var/lib/offbd offbd token create --name ann --role admin
@@ -8,7 +9,7 @@ FROM rust:1-bookworm AS build
 RUN apt-get update && apt-get install -y --no-install-recommends nodejs npm \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /src
-COPY Cargo.toml Cargo.lock ./
+COPY Cargo.toml Cargo.lock build.rs ./
 COPY crates crates
 COPY migrations migrations
 COPY benches benches
@@ -20,6 +21,8 @@ COPY web web
 # Benchmarks, examples and tests are copied because Cargo.toml names them. The build
 # leaves out the laboratory (scenes, charts, simulated rigs) and includes OpenTelemetry, NATS,
 # MQTT, e-mail, MCAP, Parquet and Excel.
+# `offbd --version` prints the commit, which the build cannot ask git for here.
+ARG OFFBD_COMMIT
 # Cache mounts keep packages and compiled dependencies from build to build; the
 # program is copied out of them, because a mount is not part of the image.
 RUN --mount=type=cache,target=/usr/local/cargo/registry \

@@ -51,7 +51,7 @@ const LOCK_TRIES: u32 = 11;
 const LOCK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The optional parts of this build, by the names of the features.
-const FEATURES: &[&str] = &[
+pub(crate) const FEATURES: &[&str] = &[
     #[cfg(feature = "email")]
     "email",
     #[cfg(feature = "mcap")]

@@ -1,5 +1,6 @@
 //! Builds the page under `web/` where Node is there. Without Node the service
-//! is built all the same, and its `/` says how to get the page.
+//! is built all the same, and its `/` says how to get the page. The published crate has no
+//! `web/`, but the built page.
 
 use std::env;
 use std::error::Error;
@@ -19,15 +20,37 @@ const SOURCES: [&str; 7] = [
     "../offbd-wire/src/drive_cycle/run.py",
 ];
 
+/// The built page in the published crate. `docs/operations/install.md` says how it gets there.
+const PUBLISHED: &str = "page";
+
 /// The oldest Node that the page's tools run on, as `web/package.json` has it.
 const NODE: (u32, u32) = (18, 19);
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
+    let out = PathBuf::from(env::var("OUT_DIR")?).join("page");
+    if !Path::new("../../web/package.json").exists() && Path::new(PUBLISHED).exists() {
+        return Ok(copy(Path::new(PUBLISHED), &out)?);
+    }
     for source in SOURCES {
         println!("cargo::rerun-if-changed={source}");
     }
-    page(&PathBuf::from(env::var("OUT_DIR")?).join("page"))
+    page(&out)
+}
+
+/// Copies a folder with all that it contains.
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (path, target) = (entry.path(), to.join(entry.file_name()));
+        if path.is_dir() {
+            copy(&path, &target)?;
+        } else {
+            fs::copy(&path, &target)?;
+        }
+    }
+    Ok(())
 }
 
 /// Leaves the page in `out`, or `out` empty where it cannot be built here.

@@ -14,6 +14,7 @@ mod help;
 mod serve;
 mod token;
 mod usage;
+mod version;
 mod watch;
 
 use std::process::ExitCode;
@@ -35,7 +36,7 @@ const SQLITE_THREAD: &str = "sqlx-sqlite-worker-";
 /// rig, its twin, runs in parallel; deviations are diagnosed as faults of the
 /// servos, the ball or the sensor.
 #[derive(Debug, Parser)]
-#[command(name = "offbd", version, max_term_width = 80)]
+#[command(name = "offbd", version, long_version = version::long(), max_term_width = 80)]
 #[command(after_help = "Start here:\n  \
     offbd demo --seconds 60\n\n\
     With files:\n  \

@@ -114,7 +114,7 @@ fn write_table(rows: &chart::ChartTable) -> anyhow::Result<()> {
 
 macro_rules! scene {
     ($name:literal) => {
-        include_str!(concat!("../../../examples/scenes/", $name, ".json"))
+        include_str!(concat!("../scenes/", $name, ".json"))
     };
 }
 

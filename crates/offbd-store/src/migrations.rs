@@ -9,7 +9,7 @@ use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::{AssertSqlSafe, SqlSafeStr};
 
 #[derive(rust_embed::RustEmbed)]
-#[folder = "$CARGO_MANIFEST_DIR/../../migrations"]
+#[folder = "$CARGO_MANIFEST_DIR/migrations"]
 struct MigrationFiles;
 
 pub(super) static MIGRATIONS: LazyLock<Migrator> = LazyLock::new(|| {
@@ -32,7 +32,7 @@ mod tests {
     /// Databases store the checksums, so they must equal those that sqlx computes itself.
     #[tokio::test]
     async fn embedded_migrations_equal_those_that_sqlx_reads() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../migrations");
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/migrations");
         let read = Migrator::new(std::path::Path::new(folder)).await.unwrap();
         let key = |m: &Migration| (m.version, m.description.clone(), m.checksum.clone());
         let embedded: Vec<_> = MIGRATIONS.iter().map(key).collect();

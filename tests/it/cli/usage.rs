@@ -32,6 +32,18 @@ fn the_help_of_each_command_has_an_example_and_fits_in_eighty_columns() {
 }
 
 #[test]
+fn the_long_version_has_the_commit_and_the_features() {
+    let cli = CliFixture::new();
+    let version = concat!("offbd ", env!("CARGO_PKG_VERSION"), "\n");
+    assert_eq!(cli.ok("-V").stdout, version);
+    let long = cli.ok("--version").stdout;
+    let lines: Vec<&str> = long.lines().collect();
+    assert_eq!(lines[0], version.trim());
+    assert!(lines[1].starts_with("commit: "), "{long}");
+    assert!(lines[2].starts_with("features: lab"), "{long}");
+}
+
+#[test]
 fn invalid_arguments_exit_with_2_and_a_hint() {
     let cli = CliFixture::new();
     for (line, expected) in [

@@ -42,7 +42,7 @@ enum EntryContent {
 
 macro_rules! file {
     ($name:literal) => {
-        include_str!(concat!("../../../../examples/scenes/", $name, ".json"))
+        include_str!(concat!("../../scenes/", $name, ".json"))
     };
 }
 
