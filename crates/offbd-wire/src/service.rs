@@ -247,6 +247,9 @@ pub fn unjudged_view(run: Unjudged) -> UnjudgedView {
 pub struct FleetFaultView {
     pub code: CodeWord,
     pub kind: Option<KindWord>,
+    /// Weight of this kind among the candidates, in (0, 1]; null without a kind.
+    #[serde(default)]
+    pub kind_weight: Option<f64>,
     /// `pending` or `confirmed`.
     pub status: StatusWord,
     /// Whether the last result of its test is a failure; false for a fault on record whose

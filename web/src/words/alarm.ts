@@ -1,7 +1,7 @@
 /** Words about alarms. */
 import type { Alarm, AlarmChange, AlarmCode } from "../api/alarms";
 import { faultPath, rigPath } from "../router/paths";
-import { codeTitle } from "./fault-names";
+import { codeTitle, faultTitle } from "./fault-names";
 import { statusWord } from "./fault-state";
 
 export const ALARM_CODES: AlarmCode[] = ["x_servo", "y_servo", "stuck_ball", "sensor", "communication_lost"];
@@ -17,8 +17,8 @@ export const CHANGES: Record<AlarmChange, string> = {
 export const alarmCodeTitle = (code: AlarmCode) =>
   code === "communication_lost" ? "No data" : codeTitle(code);
 
-export const alarmTitle = ({ code, kind }: Pick<Alarm, "code" | "kind">) =>
-  alarmCodeTitle(code) + (kind ? ` (${kind})` : "");
+export const alarmTitle = ({ code, ...kind }: Pick<Alarm, "code" | "kind" | "kind_weight">) =>
+  code === "communication_lost" ? alarmCodeTitle(code) : faultTitle({ code, ...kind });
 
 /** The view that shows more of an alarm. */
 export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>

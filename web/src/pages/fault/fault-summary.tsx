@@ -26,12 +26,12 @@ function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
 
 /** The fault in one sentence and how it stands now, or the note that it is not active. */
 export function FaultSummary({ fault, history }: { fault: FaultEntry; history: HistoryEntry[] }) {
-  const { code, kind, status } = fault;
+  const { code, status } = fault;
   if (isActive(fault)) {
     const failure = latestFailure(history);
     const seen = failure
       ? sentence(failure.summary)
-      : `${capitalised(faultMeaning(code, kind, !isFailing(fault)))}.`;
+      : `${capitalised(faultMeaning(fault, !isFailing(fault)))}.`;
     return (
       <div>
         <p class="sentence">{seen}</p>
