@@ -26,9 +26,9 @@ export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
 
 /** What an alarm is now, and the class of its look. */
 export function alarmState(
-  alarm: Pick<Alarm, "code" | "failing" | "tested" | "session_open" | "status" | "muted">,
+  alarm: Pick<Alarm, "code" | "failing" | "tested" | "session_open" | "status" | "muted" | "acknowledgement">,
 ) {
-  const { code, failing, tested, session_open, status, muted } = alarm;
+  const { code, failing, tested, session_open, status, muted, acknowledgement } = alarm;
   // Whether data arrive is tested all the same; only nobody is told.
   if (muted && code === "communication_lost") return { text: `muted by ${muted.by}`, look: "status-cleared" };
   if (muted) return { text: `not tested (muted by ${muted.by})`, look: "status-cleared" };
@@ -39,6 +39,8 @@ export function alarmState(
     return { text: isNow ? "△ suspected" : "suspected when last tested", look: "status-pending" };
   if (failing && code === "communication_lost") return { text: "▲ no data now", look: "status-confirmed" };
   if (failing) return { text: isNow ? "▲ failing" : "▲ failed when last tested", look: "status-confirmed" };
-  if (status === "healed") return { text: "healed", look: "status-healed" };
+  const isUnseen = code !== "communication_lost" && !acknowledgement;
+  if (status === "healed")
+    return { text: isUnseen ? "healed, not acknowledged" : "healed", look: "status-healed" };
   return { text: `passing again; was ${statusWord(status)}`, look: "status-pending" };
 }
