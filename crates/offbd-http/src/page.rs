@@ -54,8 +54,17 @@ pub(super) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Respo
 }
 
 /// First segments of the routes of the page, which link previews and curl fetch without asking for HTML.
-const CLIENT_ROUTES: [&str; 8] =
-    ["rigs", "sessions", "alarms", "notifications", "compare", "set-up", "learn", "administration"];
+const CLIENT_ROUTES: [&str; 9] = [
+    "jobs",
+    "rigs",
+    "sessions",
+    "alarms",
+    "notifications",
+    "compare",
+    "set-up",
+    "learn",
+    "administration",
+];
 
 /// Whether `path` is a route of the page, or a browser navigates to it.
 fn is_client_route(path: &str, headers: &HeaderMap) -> bool {

@@ -17,7 +17,7 @@ export function FaultChip({ fault, hasSession, since }: Props) {
   const text = stateText(fault, hasSession, since ? sinceText(since) : undefined);
   return (
     <span class={chipClass(fault)} title={`${title}: ${text}`}>
-      <b>{title}</b> <span>{text}</span>
+      <b>{faultTitle(fault, true)}</b> <span>{text}</span>
     </span>
   );
 }

@@ -100,9 +100,10 @@ function doubt({ kind, kind_weight, candidates }: Finding): number | undefined {
 }
 
 /** Returns the kind of a fault: `dead`, or `probably dead, 51 %`. */
-export function kindText(fault: Finding): string {
+export function kindText(fault: Finding, isShort = false): string {
   const percent = doubt(fault);
-  return percent === undefined ? (fault.kind ?? "") : `probably ${fault.kind}, ${percent} %`;
+  if (percent === undefined) return fault.kind ?? "";
+  return `probably ${fault.kind}${isShort ? "" : `, ${percent} %`}`;
 }
 
 /** Returns what is wrong with the rig, or was if the test of the fault passes again. */
@@ -122,5 +123,6 @@ export const kindMeaning = (kind?: FaultKind | null) =>
 export const injectedMeaning = (kind: string) =>
   isFaultKind(kind) ? (KIND[kind].injected ?? KIND[kind].meaning) : null;
 
-export const faultTitle = (fault: Finding) =>
-  codeTitle(fault.code) + (fault.kind ? ` (${kindText(fault)})` : "");
+/** Returns the title of a fault with its kind, and without the weight of the kind if it `isShort`. */
+export const faultTitle = (fault: Finding, isShort = false) =>
+  codeTitle(fault.code) + (fault.kind ? ` (${kindText(fault, isShort)})` : "");

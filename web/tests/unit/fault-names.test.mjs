@@ -27,6 +27,7 @@ test("a kind that is not much likelier than the others is stated as probable, wi
   ];
   const fault = { code: "x_servo", kind: "dead", status: "confirmed", candidates };
   assert.equal(faultTitle(fault), "X servo (probably dead, 51 %)");
+  assert.equal(faultTitle(fault, true), "X servo (probably dead)", "in a chip");
   assert.equal(faultMeaning(fault), "probably does not respond: the plate returns to zero");
   assert.equal(
     faultTitle({ code: "x_servo", kind: "dead", kind_weight: 0.51 }),

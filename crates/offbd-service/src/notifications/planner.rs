@@ -239,3 +239,31 @@ pub(crate) fn delivery(
         error: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_confirmation_and_its_kind_are_one_message() {
+        let document = |kind: Option<&str>, byte: &str| {
+            json!({ "code": "x_servo", "status": "confirmed", "status_byte": byte,
+                "onset_s": 1.5, "kind": kind })
+        };
+        let row = |asset: &str, document: Value| PlannedEventRow {
+            id: 1,
+            asset: asset.to_owned(),
+            session: Some("s".to_owned()),
+            at: 0,
+            document: document.to_string(),
+        };
+        let unnamed = document(None, "2F");
+        let is_named_by =
+            |next: PlannedEventRow| is_named_by(&row("a", unnamed.clone()), &unnamed, &next);
+        assert!(is_named_by(row("a", document(Some("dead"), "2F"))));
+        assert!(!is_named_by(row("a", document(None, "2F"))), "no kind");
+        assert!(!is_named_by(row("a", document(Some("dead"), "2E"))), "it passes again");
+        assert!(!is_named_by(row("b", document(Some("dead"), "2F"))), "another rig");
+    }
+}
