@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { alarmTitle } from "../../src/words/alarm.ts";
 import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
+import { repairNote } from "../../src/words/fault-state.ts";
 import { verdict } from "../../src/words/verdict.ts";
 
 test("known codes and kinds have titles, unknown ones are shown as plain text", () => {
@@ -39,4 +40,9 @@ test("a kind that is not much likelier than the others is stated as probable, wi
   assert.equal(alarmTitle({ code: "x_servo", kind: "dead", kind_weight: 0.51 }), faultTitle(fault));
   const summary = { outcome: "fault", faults: ["x_servo"], monitors: [] };
   assert.equal(verdict(summary, [fault]).text, "X servo (probably dead, 51 %)");
+});
+
+test("an offset whose test passes again is not told as repaired", () => {
+  assert.match(repairNote({ kind: "offset" }), /without a repair: check the servo/);
+  assert.equal(repairNote({ kind: "dead" }), "");
 });
