@@ -31,7 +31,7 @@ export function buildBall(kind: keyof typeof LOOKS, radius: number): Group {
     side: isGhost ? BackSide : FrontSide,
   });
   const sphere = new Mesh(new SphereGeometry(radius * look.scale, 40, 28), material);
-  sphere.position.z = radius;
+  sphere.position.z = radius * look.scale;
   const shadow = new Mesh(
     new CircleGeometry(radius * 0.8, 32),
     new MeshBasicMaterial({ color: 0x000000, transparent: true, opacity: look.shadow, side: DoubleSide }),
