@@ -20,8 +20,8 @@ use offbd_wire::verdict::{AxisEvidenceView, FaultView};
 
 /// Shows an asset live: residuals and their limits, monitors, faults.
 ///
-/// In a terminal the state is updated in place; otherwise each state is printed
-/// as a line, below a heading for each session. Changes of faults are printed
+/// In a terminal the state is updated in place; otherwise each state that differs
+/// from the one before is printed as a line, below a heading for each session. Changes of faults are printed
 /// when they happen. With --format json each state and each change is one JSON
 /// object, as the service sends it. Ends with Ctrl-C
 /// or when the service stops.
@@ -69,12 +69,15 @@ async fn watch(args: &WatchArgs) -> anyhow::Result<()> {
         let Message::Text(text) = message? else { continue };
         let frame: Value = serde_json::from_str(&text)?;
         let kind = frame["type"].as_str();
-        left -= u64::from(kind == Some("state"));
+        let is_state = kind == Some("state");
         match kind {
             Some("state" | "fault") if args.format == OutputFormat::Json => {
+                left -= u64::from(is_state);
                 output::print_line(&text)?;
             }
-            Some("state") => screen.state(&serde_json::from_value(frame)?)?,
+            Some("state") => {
+                left -= u64::from(screen.state(&serde_json::from_value(frame)?)?);
+            }
             Some("fault") => screen.fault(&serde_json::from_value(frame)?)?,
             Some("error") => bail!("{}", frame["problem"]["detail"]),
             _ => {}
@@ -95,20 +98,27 @@ struct Screen {
     /// The session, and the progress of learning, that plain lines are about.
     session: Option<String>,
     learning: Option<String>,
+    /// The plain line of the latest state.
+    last: String,
 }
 
 impl Screen {
-    fn state(&mut self, state: &StateView) -> std::io::Result<()> {
+    /// Shows a state; returns whether it differs from the one before.
+    fn state(&mut self, state: &StateView) -> std::io::Result<bool> {
         let lines = if self.redraws { block(state) } else { self.plain(state) };
+        if lines.is_empty() {
+            return Ok(false);
+        }
         let mut out = output::stdout();
         self.erase(&mut out)?;
         self.drawn = lines.len();
         lines.iter().try_for_each(|line| writeln!(out, "{line}"))?;
-        out.flush()
+        out.flush()?;
+        Ok(true)
     }
 
     /// A state as one line, after a heading if the session is another one, and after the
-    /// progress of learning if it has changed.
+    /// progress of learning if it has changed; nothing if it is that of the state before.
     fn plain(&mut self, state: &StateView) -> Vec<String> {
         let mut lines = self.heading(state.session.as_deref().unwrap_or("no session"));
         let learning = state.learning.as_ref().map(|learning| learning.summary.clone());
@@ -117,7 +127,11 @@ impl Screen {
             lines.extend(summary);
             self.learning = learning;
         }
-        lines.push(line(state));
+        let line = line(state);
+        if line != self.last {
+            lines.push(line.clone());
+            self.last = line;
+        }
         lines
     }
 
@@ -166,7 +180,8 @@ fn head(state: &StateView) -> String {
 }
 
 /// Heading of the plain lines: the columns of [`line`].
-const HEADING: &str = "       time    samples   x residual/limit   y residual/limit   judged %";
+const HEADING: &str = "       time    samples   x residual/limit   y residual/limit   \
+    judged %: x_servo, y_servo, stuck_ball, sensor";
 
 /// A state as one line, for logs.
 fn line(state: &StateView) -> String {

@@ -44,8 +44,8 @@ async fn open_store(config: &Config) -> Result<(Store, Writer)> {
 
 async fn write(mut writer: Writer, change: AccessWrite, act: &str, id: &str) -> Result<()> {
     let (act, target) = (act.to_owned(), format!("/api/v1/tokens/{id}"));
-    let entry =
-        AuditEntry { action: act, target, address: None }.row((ACTOR, None), Clock::System.now());
+    let entry = AuditEntry { action: act, target, address: None, by: None }
+        .row((ACTOR, None), Clock::System.now());
     let changes = [change, AccessWrite::Audit(entry)];
     let mut set = changes.map(Write::Access).to_vec();
     writer.commit(&mut [ChangeSet { partition: None, writes: &mut set }]).await?;

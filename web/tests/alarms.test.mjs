@@ -1,35 +1,23 @@
-// Alarms, mutes and notifications in the page.
+// Alarms and mutes in the page.
 import assert from "node:assert/strict";
-import { createServer } from "node:http";
-import { after, test } from "node:test";
+import { test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started, until } from "./support.mjs";
 
 /** The label of the field for the name that is recorded with an action. */
 const ACTOR = "Your name, recorded with the action";
 
-let work, service, chromium, receiver;
-const received = [];
+let work, service, chromium, learntRig, sickRows;
 
 started(async (made) => {
   ({ work, service, chromium } = made);
   const { learnt, sick } = recordings(work);
+  [learntRig, sickRows] = [learnt, sick];
   for (const name of ["bench", "shelf"]) {
     await ask(service.url, "POST", "/assets", { ...learnt, name });
     await imported(service.url, name, "monday", sick);
   }
-  receiver = createServer((request, answer) => {
-    let body = "";
-    request.on("data", (part) => (body += part));
-    request.on("end", () => {
-      received.push(JSON.parse(body));
-      answer.end();
-    });
-  });
-  await new Promise((done) => receiver.listen(0, "127.0.0.1", done));
 });
-
-after(() => receiver?.close());
 
 test("alarms from before the page was opened are listed and acknowledged together", async () => {
   const view = await page(chromium);
@@ -37,7 +25,12 @@ test("alarms from before the page was opened are listed and acknowledged togethe
   for (const rig of ["bench", "shelf"])
     await view.getByRole("checkbox", { name: new RegExp(`X servo.* of ${rig}`) }).check();
   await view.getByLabel(ACTOR).fill("ada");
+  await view.getByText("2 alarms").waitFor();
+  // Several at once are acknowledged after a question.
   await view.getByRole("button", { name: "Acknowledge 2" }).click();
+  const question = view.getByRole("dialog", { name: "Acknowledge 2 alarms?" });
+  await question.getByText("cannot be taken back").waitFor();
+  await question.getByRole("button", { name: "Acknowledge 2" }).click();
   await view.getByText("ada,").nth(1).waitFor();
   for (const rig of ["bench", "shelf"]) {
     const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
@@ -48,6 +41,38 @@ test("alarms from before the page was opened are listed and acknowledged togethe
     .getByRole("link", { name: /X servo/ })
     .first()
     .waitFor({ state: "detached" });
+  await view.done();
+});
+
+test("alarms are found by a part of the rig's name, ordered and grouped", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/alarms?sort=rig`);
+  const rigs = () => view.locator("table.alarms tbody th[scope=row]").allTextContents();
+  await until(async () => (await rigs()).join() === "bench,shelf");
+  await view.getByLabel("Rig", { exact: true }).fill("HEL");
+  await until(async () => (await rigs()).join() === "shelf");
+  await view.getByText("1 alarm", { exact: true }).waitFor();
+  await view.getByLabel("Rig", { exact: true }).fill("");
+  await view.getByLabel("Group by").selectOption({ label: "Fault" });
+  await view.getByRole("rowheader", { name: "X servo (2)" }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("the number of alarms that fail and that nobody has acknowledged is in the header", async () => {
+  await ask(service.url, "POST", "/assets", { ...learntRig, name: "badge" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  const link = view.getByRole("navigation", { name: "Views" }).getByRole("link", { name: /^Alarms/ });
+  const badge = async () => Number((await link.textContent()).replace("Alarms", "").trim());
+  await link.waitFor();
+  const before = await badge();
+  await imported(service.url, "badge", "monday", sickRows);
+  await until(async () => (await badge()) === before + 1);
+  const alarms = [{ asset: "badge", code: "x_servo" }];
+  await ask(service.url, "POST", "/alarms/acknowledge", { alarms });
+  await until(async () => (await badge()) === before);
+  await ask(service.url, "DELETE", "/assets/badge");
   await view.done();
 });
 
@@ -76,109 +101,6 @@ test("what to do is told, and the owner's note is kept", async () => {
   }
   await view.emulateMedia({ media: "print" });
   assert.equal(await view.getByRole("button", { name: "Edit the remark" }).isVisible(), false);
-  await view.done();
-});
-
-test("a channel and a rule are made in the page, and a test message arrives", async () => {
-  const view = await page(chromium);
-  await view.goto(`${service.url}/notifications`);
-  await view.getByText("no notifications are sent").waitFor();
-  await view.getByRole("button", { name: "Add a channel" }).click();
-  await view.getByLabel("Name").fill("workshop");
-  await view.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/hook`);
-  await view.getByRole("button", { name: "Add", exact: true }).click();
-  await view.getByText(/^whsec_/).waitFor();
-  await view.getByRole("button", { name: "Test workshop" }).click();
-  await view.getByText("delivered").waitFor();
-  assert.equal(received[0].type, "org.offbd.test.v1");
-  await view.getByRole("button", { name: "Add a rule" }).click();
-  const { y, height } = await view.getByRole("dialog").boundingBox();
-  assert.ok(Math.abs(y + height / 2 - 400) < 100, `the dialog is in the middle: ${y}, ${height}`);
-  await view.getByLabel("Name").fill("everything");
-  await view.getByRole("button", { name: "Add", exact: true }).click();
-  await view.getByRole("button", { name: "Mute 8 h" }).click();
-  await view.getByText("muted until").waitFor();
-  const [rule] = (await ask(service.url, "GET", "/notifications/rules")).items;
-  assert.deepEqual([rule.name, rule.asset, rule.channel_name], ["everything", "*", "workshop"]);
-  assert.ok(Date.parse(rule.silent_until) > Date.now());
-  await view.done();
-});
-
-test("a channel is changed in the page, and its secrets stay and are not shown", async () => {
-  const password = "correct horse";
-  const email = { host: "127.0.0.1", port: 2525, security: "none", from: "offbd@bench", to: ["ada@bench"] };
-  const mail = { name: "mail", email: { ...email, user: "offbd", password } };
-  const mailId = (await ask(service.url, "POST", "/notifications/channels", mail)).id;
-  const view = await page(chromium);
-  await view.goto(`${service.url}/notifications`);
-  const edit = async (name) => {
-    await view.getByRole("button", { name: `Edit ${name}` }).click();
-    return view.getByRole("dialog", { name: `Edit the channel ${name}` });
-  };
-  const webhook = await edit("workshop");
-  assert.match(await webhook.getByLabel("URL").inputValue(), /\/hook$/);
-  await webhook.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/other`);
-  await webhook.getByRole("button", { name: "Save" }).click();
-  await webhook.waitFor({ state: "detached" });
-  await view.getByText("/other").waitFor();
-  assert.equal(await view.getByText(/^whsec_/).count(), 0, "the key is the one before");
-  const before = received.length;
-  await view.getByRole("button", { name: "Test workshop" }).click();
-  await until(() => received.length > before);
-
-  const dialog = await edit("mail");
-  assert.equal(await dialog.getByLabel("User").inputValue(), "offbd");
-  assert.equal(await dialog.getByLabel("New password").inputValue(), "");
-  assert.equal(await dialog.getByLabel("To").inputValue(), "ada@bench");
-  await dialog.getByLabel("To").fill("ada@bench, bob@bench");
-  await dialog.getByRole("button", { name: "Save" }).click();
-  await dialog.waitFor({ state: "detached" });
-  await view.getByText("ada@bench, bob@bench by 127.0.0.1:2525").waitFor();
-  assert.ok(!(await view.content()).includes(password));
-  const channel = await ask(service.url, "GET", `/notifications/channels/${mailId}`);
-  assert.deepEqual(channel.email, {
-    ...email,
-    to: ["ada@bench", "bob@bench"],
-    user: "offbd",
-    has_password: true,
-  });
-  await ask(service.url, "DELETE", `/notifications/channels/${mailId}`);
-  assert.deepEqual(view.errors, []);
-  await view.done();
-});
-
-test("on a phone, nothing of a channel, rule or message is off the screen", async () => {
-  const view = await page(chromium, { viewport: { width: 390, height: 800 } });
-  await view.goto(`${service.url}/notifications`);
-  await view.getByText("workshop").first().waitFor();
-  await view.getByText("everything").first().waitFor();
-  const cut = () =>
-    [...document.querySelectorAll(".scroll")]
-      .map((box) => box.scrollWidth - box.clientWidth)
-      .filter((px) => px > 0);
-  assert.deepEqual(await view.evaluate(cut), []);
-  await view.done();
-});
-
-test("a rule and a channel are deleted after a question", async () => {
-  const view = await page(chromium);
-  await view.goto(`${service.url}/notifications`);
-  for (const [kind, name] of [
-    ["rule", "everything"],
-    ["channel", "workshop"],
-  ]) {
-    const listed = async () => (await ask(service.url, "GET", `/notifications/${kind}s`)).items.length;
-    const dialog = view.getByRole("dialog", { name: `Delete the ${kind} ${name}?` });
-    await view.getByRole("button", { name: `Delete ${name}` }).click();
-    await dialog.getByRole("button", { name: "Cancel" }).click();
-    await dialog.waitFor({ state: "detached" });
-    assert.equal(await listed(), 1);
-    await view.getByRole("button", { name: `Delete ${name}` }).click();
-    await dialog.getByRole("button", { name: "Delete" }).click();
-    await view.getByRole("button", { name: `Delete ${name}` }).waitFor({ state: "detached" });
-    assert.equal(await listed(), 0);
-  }
-  assert.deepEqual(view.errors, []);
   await view.done();
 });
 

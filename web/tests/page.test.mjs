@@ -58,7 +58,7 @@ test("addresses of views return the page, others a problem", async () => {
   const html = { accept: "text/html,*/*" };
   assert.match((await fetched("/rigs/bench", html)).headers["content-type"], /text\/html/);
   for (const [path, headers] of [
-    ["/rigs/bench", {}],
+    ["/none", {}],
     ["/api/v1/none", html],
     ["/static/none.js", html],
   ]) {

@@ -154,7 +154,7 @@ try {
   await shoot(of, "import", `${base}/sessions`, heading("Sessions"), async (view) => {
     await view.getByText("monday").first().waitFor();
     await view.locator("input[type=file]").setInputFiles(path("sick.csv"));
-    await view.getByText("as it should").first().waitFor();
+    await view.getByText("of the rows").first().waitFor();
   });
   await shoot(of, "set-up", `${base}/set-up`, heading("Set up a rig"));
   await shoot(of, "connect", `${base}/rigs/bench-3/set-up?step=connect`, heading("Set up bench-3"));

@@ -80,6 +80,7 @@ test("described, connected, corrected, learnt", async () => {
   await view.getByText(/x and y swapped/).waitFor();
   const { axes } = await ask(service.url, "GET", "/assets/bench-1");
   assert.deepEqual([axes.swap, axes.x_sign, axes.y_sign, axes.position_unit_m], [true, 1, -1, 0.001]);
+  await view.getByText("The session was ended here. A device that names no session").waitFor();
   // The next session is complete, however long the detection took.
   at = 0;
   await device(async () => (await view.getByText("moves as commanded").count()) === 2);

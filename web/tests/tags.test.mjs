@@ -19,7 +19,7 @@ test("tags are set on the rig's page and select rigs, alarms and sessions", asyn
   await view.goto(`${service.url}/rigs/bench`);
   await view.getByRole("button", { name: "Add tags" }).click();
   await view.getByRole("textbox", { name: "Tags, separated by blanks" }).fill("hall-2 spare");
-  await view.getByRole("button", { name: "Save" }).click();
+  await view.getByRole("textbox", { name: "Tags, separated by blanks" }).press("Enter");
   await view.getByRole("link", { name: "hall-2" }).click();
   const rigs = view.getByRole("list", { name: "Rigs" });
   await rigs.getByRole("link", { name: /bench/ }).waitFor();

@@ -6,9 +6,9 @@ use utoipa_axum::routes;
 
 use super::routes::GuardedRouter;
 use super::{
-    Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, fleet, learning,
-    login, metrics, notifications, operations, remarks, replays, series, sessions, sovd, stream,
-    tags, telemetry, tokens, traces, trials,
+    Api, alarms, assets, calibrations, cluster, drive_cycles, events, faults, fleet, jobs,
+    learning, login, metrics, notifications, operations, remarks, replays, series, sessions, sovd,
+    stream, tags, telemetry, tokens, traces, trials,
 };
 use offbd_service::access::Right::{
     Administer, Authenticated, ControlSessions, Operate, Public, Read, ReadAsset, SendTelemetry,
@@ -45,6 +45,7 @@ fn with_assets(router: GuardedRouter) -> GuardedRouter {
         .routes(ReadAsset, routes!(drive_cycles::get))
         .routes(Read, routes!(fleet::get))
         .routes(Read, routes!(cluster::get))
+        .routes(Read, routes!(jobs::list))
         .routes(Read, routes!(calibrations::list))
         .routes(Operate, routes!(calibrations::create))
         .routes(Read, routes!(calibrations::get))

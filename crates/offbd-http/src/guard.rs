@@ -23,6 +23,7 @@ use serde::Deserialize;
 
 use super::body::BodyShare;
 use super::credential::{OriginalClient, bearer, client_address, credential};
+use super::faults::ActorQuery;
 use super::forward::{self, Forwarder};
 use super::rates::RateLimits;
 use super::routes::{RouteRule, RouteRules};
@@ -370,7 +371,9 @@ fn is_audited(right: Right, method: &Method) -> bool {
 
 fn audit_entry(action: String, parts: &Parts) -> AuditEntry {
     let address = client_address(&parts.extensions).map(|address| address.to_string());
-    AuditEntry { action, target: parts.uri.path().to_owned(), address }
+    let by = extract::Query::<ActorQuery>::try_from_uri(&parts.uri).ok();
+    let by = by.and_then(|by| by.0.known_actor(&Caller::Anonymous));
+    AuditEntry { action, target: parts.uri.path().to_owned(), address, by }
 }
 
 fn host(headers: &HeaderMap) -> Option<Authority> {

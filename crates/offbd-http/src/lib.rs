@@ -26,6 +26,7 @@ mod forward;
 mod gather;
 mod guard;
 mod headers;
+mod jobs;
 mod json_body;
 mod layers;
 mod learning;
@@ -272,7 +273,10 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     let router = router
         .route("/openapi.yaml", axum::routing::get(move || operations::yaml(yaml)))
         .route("/asyncapi.yaml", axum::routing::get(move || operations::yaml(messages)))
-        .merge(SwaggerUi::new("/docs").url("/openapi.json", document))
+        .merge(
+            Router::<App>::from(SwaggerUi::new("/docs").url("/openapi.json", document))
+                .layer(axum::middleware::map_response(page::named_docs)),
+        )
         .fallback(page::serve)
         .method_not_allowed_fallback(problem::method_not_allowed)
         .with_state(app)

@@ -62,7 +62,8 @@ pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<R
     };
     let (secret, duration) = app.service.log_in(&principal).await?;
     let caller = Caller::Authenticated(principal);
-    let entry = AuditEntry { action: "log_in".to_owned(), target: PATH.to_owned(), address };
+    let (action, target) = ("log_in".to_owned(), PATH.to_owned());
+    let entry = AuditEntry { action, target, address, by: None };
     app.service.audit_action(&caller, entry).await?;
     let cookie = set_cookie(&secret, duration.as_secs(), app.policy.encrypted);
     Ok((cookie, Json(view(&caller))).into_response())

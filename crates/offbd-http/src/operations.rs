@@ -26,12 +26,15 @@ pub(super) struct HealthView {
     /// The optional parts of this build: `email`, `mcap`, `mqtt`, `nats`, `otel`, `parquet`,
     /// `xlsx`. Without one, its formats are refused with 406 or 415, and its settings with 422.
     features: &'static [&'static str],
+    /// Whether messages have links to the dashboard: `notifications.public_url` is set.
+    message_links: bool,
 }
 
 fn healthy(app: &App) -> Json<HealthView> {
     let (demo, rebuilding) = (app.demo, app.service.n_rebuilding());
     let (version, features) = (env!("CARGO_PKG_VERSION"), app.features);
-    Json(HealthView { status: "ok", version, demo, rebuilding, features })
+    let message_links = app.service.has_public_url();
+    Json(HealthView { status: "ok", version, demo, rebuilding, features, message_links })
 }
 
 /// Liveness: succeeds while the process runs.

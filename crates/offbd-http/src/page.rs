@@ -8,8 +8,9 @@ use data_encoding::HEXLOWER;
 
 use axum::body::Body;
 use axum::http::header::{
-    ACCEPT, ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_SECURITY_POLICY,
-    CONTENT_TYPE, ETAG, HeaderValue, IF_NONE_MATCH, REFERRER_POLICY, VARY, X_CONTENT_TYPE_OPTIONS,
+    ACCEPT, ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_LENGTH,
+    CONTENT_SECURITY_POLICY, CONTENT_TYPE, ETAG, HeaderValue, IF_NONE_MATCH, REFERRER_POLICY, VARY,
+    X_CONTENT_TYPE_OPTIONS,
 };
 use axum::http::{HeaderMap, Method, StatusCode, Uri};
 use axum::response::{Html, IntoResponse, Response};
@@ -52,13 +53,52 @@ pub(super) async fn serve(method: Method, uri: Uri, headers: HeaderMap) -> Respo
     }
 }
 
-/// Whether a browser navigates to a client-side route of the page.
+/// First segments of the routes of the page, which link previews and curl fetch without asking for HTML.
+const CLIENT_ROUTES: [&str; 9] = [
+    "jobs",
+    "rigs",
+    "sessions",
+    "alarms",
+    "notifications",
+    "compare",
+    "set-up",
+    "learn",
+    "administration",
+];
+
+/// Whether `path` is a route of the page, or a browser navigates to it.
 fn is_client_route(path: &str, headers: &HeaderMap) -> bool {
+    if path.split('/').next().is_some_and(|first| CLIENT_ROUTES.contains(&first)) {
+        return true;
+    }
     let accept = headers.get(ACCEPT).and_then(|a| a.to_str().ok()).unwrap_or_default();
     accept.contains("text/html")
         && !path.starts_with("api/")
         && !path.starts_with("sovd/")
         && !path.starts_with(HASHED)
+}
+
+/// Largest page of the API's description that is changed, bytes. Its own are below 2 kB.
+const MAX_DOCS: usize = 100_000;
+
+/// Gives the page of the API's description a title of its own and a link to the dashboard.
+pub(super) async fn named_docs(response: Response) -> Response {
+    let is_html = |value: &HeaderValue| value.as_bytes().starts_with(b"text/html");
+    if !response.headers().get(CONTENT_TYPE).is_some_and(is_html) {
+        return response;
+    }
+    let (mut head, body) = response.into_parts();
+    let Ok(bytes) = axum::body::to_bytes(body, MAX_DOCS).await else {
+        return StatusCode::INTERNAL_SERVER_ERROR.into_response();
+    };
+    let page = String::from_utf8_lossy(&bytes)
+        .replace("<title>Swagger UI</title>", "<title>API · offbd</title>")
+        .replace(
+            "<div id=\"swagger-ui\">",
+            "<p><a href=\"/\">Dashboard</a></p><div id=\"swagger-ui\">",
+        );
+    head.headers.remove(CONTENT_LENGTH);
+    Response::from_parts(head, Body::from(page))
 }
 
 fn index(headers: &HeaderMap) -> Response {

@@ -220,6 +220,13 @@ impl JobQueue {
         Some(RunningJob { job, cancelled, queue: self.clone() })
     }
 
+    /// Lists the jobs: the running ones, then those that wait, the next one first.
+    pub(super) fn list(&self) -> Vec<Job> {
+        let order = self.order();
+        let running = order.running.iter().map(|(job, _)| job);
+        running.chain(order.waiting.iter().map(|waiting| &waiting.job)).cloned().collect()
+    }
+
     fn cancel(&self, id: &str) -> Option<CancelledJob> {
         let mut order = self.order();
         if let Some(at) = order.waiting.iter().position(|waiting| waiting.job.id() == id) {

@@ -56,8 +56,8 @@ pub struct AuditView {
     pub id: String,
     /// Time of the action, RFC 3339.
     pub at: String,
-    /// Name of the token, or the subject of a JSON Web Token; `anyone` if the service
-    /// requires no token, `command line` for the command line.
+    /// Name of the token, or the subject of a JSON Web Token. If the service requires no token, the
+    /// name that the request gave in `by`, else `anyone`; `command line` for the command line.
     pub actor: String,
     /// Id of the token, or issuer and subject of a JSON Web Token; null without a token.
     pub token_id: Option<String>,

@@ -41,6 +41,8 @@ pub struct AlarmView {
     pub code: AlarmCodeWord,
     /// Failure mode; null if the evidence does not determine it.
     pub kind: Option<KindWord>,
+    /// Weight of this kind among the candidates, in (0, 1]; null without a kind.
+    pub kind_weight: Option<f64>,
     /// Status of the fault; of lost communication `confirmed`, or `healed` once data arrive.
     pub status: StatusWord,
     /// Whether the last result of its test is a failure.

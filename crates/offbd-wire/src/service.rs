@@ -13,8 +13,8 @@ use super::trace::TraceView;
 use super::trend::TrendWarningView;
 use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
 use super::words::{
-    AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobState, JobWaitReason, KindWord,
-    LineWord, ModelWord, ProfileWord, SessionState, StatusWord,
+    AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobKind, JobState, JobWaitReason,
+    KindWord, LineWord, ModelWord, ProfileWord, SessionState, StatusWord,
 };
 use offbd_core::diagnosis::StatusByte;
 use offbd_core::engine::{MonitorState, State, Unjudged};
@@ -247,6 +247,9 @@ pub fn unjudged_view(run: Unjudged) -> UnjudgedView {
 pub struct FleetFaultView {
     pub code: CodeWord,
     pub kind: Option<KindWord>,
+    /// Weight of this kind among the candidates, in (0, 1]; null without a kind.
+    #[serde(default)]
+    pub kind_weight: Option<f64>,
     /// `pending` or `confirmed`.
     pub status: StatusWord,
     /// Whether the last result of its test is a failure; false for a fault on record whose
@@ -533,6 +536,26 @@ pub struct JobWaitView {
     pub reason: JobWaitReason,
     /// Number of jobs that run or come before it. Further short ones may pass it.
     pub n_before: usize,
+}
+
+/// A background job that runs or waits.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct JobView {
+    pub id: String,
+    pub kind: JobKind,
+    pub asset: String,
+    /// The service's id of the session that a replay judges; null for a calibration.
+    pub session_id: Option<String>,
+    /// Whether the rig started it by itself.
+    pub automatic: bool,
+    /// `queued` or `running`.
+    pub state: JobState,
+    /// Progress of a running replay, 0 to 1; null if it is not known.
+    pub progress: Option<f64>,
+    /// Why it waits; null if it runs.
+    pub waits: Option<JobWaitView>,
+    /// Time of creation, RFC 3339.
+    pub created_at: String,
 }
 
 /// A replay job: judging a recorded session again.

@@ -68,6 +68,19 @@ pub struct CandidateView {
     pub weight: f64,
 }
 
+/// Returns the weight of `kind` among candidates, given as kinds and weights: 1 if there are none.
+pub fn kind_weight<K: PartialEq>(
+    kind: Option<K>,
+    candidates: impl IntoIterator<Item = (Option<K>, f64)>,
+) -> Option<f64> {
+    let kind = Some(kind?);
+    let mut candidates = candidates.into_iter().peekable();
+    if candidates.peek().is_none() {
+        return Some(1.0);
+    }
+    candidates.find(|(of, _)| *of == kind).map(|(_, weight)| weight)
+}
+
 /// The quantities of the diagnosis at one time.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
 pub struct EvidenceView {

@@ -194,6 +194,13 @@ words! {
 }
 
 words! {
+    /// What a background job does.
+    JobKind as JobKind {
+        Replay = "replay", Calibration = "calibration",
+    }
+}
+
+words! {
     /// Why a background job waits.
     JobWaitReason as JobWaitReason {
         /// Other jobs run or come before it.

@@ -46,7 +46,8 @@ use show::Show;
     clears a code before it injects its fault again. Without, the rig stays healthy\n\
     for a minute, so that you can inject faults yourself on the page Lessons; then\n\
     the script injects and repairs faults, and what was found stays on record until\n\
-    you clear it. On that page you can tune the controller as well.\n\n\
+    you clear it, or heals after enough sessions without it. On that page you can\n\
+    tune the controller as well.\n\n\
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
     Exit status with --seconds: 0 if what was injected and what was found agree,\n\
     else 1.")]
@@ -159,7 +160,7 @@ fn first_fault(args: &DemoArgs, faults: &[Fault]) -> String {
     let first_s = faults.iter().map(|f| f.onset_s).fold(f64::INFINITY, f64::min) / args.speed;
     format!(
         "the first in {first_s:.0} s, unless you inject one on the page Lessons; what was found \
-         stays on record until you clear it"
+         stays on record until you clear it, or heals after enough sessions without it"
     )
 }
 

@@ -1,7 +1,7 @@
 /** The requests about alarms, mutes and notifications. */
 import type { components } from "../../generated/schema";
 import { actor } from "./access";
-import { get, query, segment, send } from "./request";
+import { get, getAll, query, segment, send } from "./request";
 import type { Page } from "./types";
 
 type Schemas = components["schemas"];
@@ -33,6 +33,7 @@ const by = () => query({ by: actor() });
 export const alarmApi = {
   alarms: (filter: AlarmFilter, cursor?: string | null) =>
     get<Page<Alarm>>(`/alarms${query({ ...filter, cursor, limit: 100 })}`),
+  allAlarms: (filter: AlarmFilter) => getAll<Alarm>("/alarms", { ...filter }),
   acknowledge: (alarms: { asset: string; code: AlarmCode }[]) =>
     send<Schemas["Acknowledged"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
   advice: () => get<Advice>("/advice"),

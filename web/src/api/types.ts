@@ -38,6 +38,7 @@ export type ServoProspects = Schemas["ServoProspects"];
 export type Candidate = Schemas["Candidate"];
 export type Calibration = Schemas["Calibration"];
 export type SessionCalibration = Schemas["SessionCalibration"];
+export type Job = Schemas["Job"];
 export type CalibrationJob = Schemas["CalibrationJob"];
 export type TrainingData = Schemas["TrainingData"];
 export type Caller = Schemas["Caller"];

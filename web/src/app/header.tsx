@@ -1,5 +1,6 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { fleetEvents, type ConnectionState } from "../api/events";
+import { useOpenAlarms } from "../hooks/use-open-alarms";
 import { LoggedIn } from "../parts/login/logged-in";
 import { useRefusal } from "../parts/login/rights";
 import { Link } from "../router/link";
@@ -18,7 +19,7 @@ function tabs([first, , third]: string[], isAdmin: boolean) {
   return [
     { to: "/", word: "Fleet", isHere: !first || (first === "rigs" && !isSetUp) },
     { to: "/alarms", word: "Alarms", isHere: first === "alarms" || first === "notifications" },
-    { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" },
+    { to: sessionsPath(), word: "Sessions", isHere: first === "sessions" || first === "jobs" },
     { to: "/set-up", word: "Set up", isHere: isSetUp },
     { to: lessonsPath(), word: "Lessons", isHere: first === "learn" },
     ...(isAdmin
@@ -34,6 +35,7 @@ export function Header({ segments }: { segments: string[] }) {
   // Every view shows the state of the connection, so it is open on all of them.
   useEffect(() => fleetEvents.listen(() => {}), []);
   const isAdmin = useRefusal("admin") === undefined;
+  const openAlarms = useOpenAlarms();
   const [first] = segments;
   const nav = useRef<HTMLElement>(null);
   // On a phone not all links are on the screen.
@@ -50,6 +52,14 @@ export function Header({ segments }: { segments: string[] }) {
         {tabs(segments, isAdmin).map(({ to, word, isHere }) => (
           <Link to={to} aria-current={isHere ? "page" : undefined}>
             {word}
+            {to === "/alarms" && openAlarms && (
+              <>
+                {" "}
+                <span class="badge" title="Failing and unacknowledged">
+                  {openAlarms}
+                </span>
+              </>
+            )}
           </Link>
         ))}
       </nav>

@@ -27,6 +27,7 @@ const SessionReport = lazy(() =>
   import("../pages/report/session-report").then((module) => module.SessionReport),
 );
 const FaultReport = lazy(() => import("../pages/report/fault-report").then((module) => module.FaultReport));
+const JobsPage = lazy(() => import("../pages/jobs").then((module) => module.JobsPage));
 const LearnPage = lazy(() => import("../pages/learn").then((module) => module.LearnPage));
 
 /** The view at the path of `segments`; `isDemo` selects the controls of the demo. */
@@ -49,6 +50,7 @@ export function Route({ segments, isDemo }: { segments: string[]; isDemo: boolea
   if (first === "compare") return <ComparePage />;
   if (first === "alarms") return <AlarmsPage />;
   if (first === "notifications") return <NotificationsPage />;
+  if (first === "jobs") return <JobsPage />;
   if (first === "administration") return <AdministrationPage />;
   if (first === "demo") return <Redirect to={lessonsPath()} />;
   if (first === "learn") return <LearnPage isDemo={isDemo} />;

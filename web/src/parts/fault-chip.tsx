@@ -1,11 +1,10 @@
-import type { FaultCode, FaultKind } from "../api/types";
-import { faultTitle } from "../words/fault-names";
+import { faultTitle, type Finding } from "../words/fault-names";
 import { chipClass, stateText } from "../words/fault-state";
 import type { FaultState } from "../words/severity";
 import { sinceText } from "../words/time";
 
 interface Props {
-  fault: FaultState & { code: FaultCode; kind?: FaultKind | null };
+  fault: FaultState & Finding;
   /** Whether a session is open. */
   hasSession: boolean;
   /** Time at which the test last began to fail. */
@@ -14,11 +13,11 @@ interface Props {
 
 /** A fault, its state, and since when. */
 export function FaultChip({ fault, hasSession, since }: Props) {
-  const title = faultTitle(fault.code, fault.kind);
+  const title = faultTitle(fault);
   const text = stateText(fault, hasSession, since ? sinceText(since) : undefined);
   return (
     <span class={chipClass(fault)} title={`${title}: ${text}`}>
-      <b>{title}</b> <span>{text}</span>
+      <b>{faultTitle(fault, true)}</b> <span>{text}</span>
     </span>
   );
 }

@@ -26,6 +26,9 @@ export const fleetPath = (values: { tag?: string } = {}) => withQuery("/", value
 /** The address of the lessons, which have the controls of the demo. */
 export const lessonsPath = () => path("learn");
 
+/** The address of the background jobs. */
+export const jobsPath = () => path("jobs");
+
 /** The addresses of the reports to print. */
 export const sessionReportPath = (id: string) => path("sessions", id, "report");
 export const faultReportPath = (name: string, code: FaultCode) =>

@@ -1,7 +1,7 @@
 /** Words about alarms. */
 import type { Alarm, AlarmChange, AlarmCode } from "../api/alarms";
 import { faultPath, rigPath } from "../router/paths";
-import { codeTitle } from "./fault-names";
+import { codeTitle, faultTitle } from "./fault-names";
 import { statusWord } from "./fault-state";
 
 export const ALARM_CODES: AlarmCode[] = ["x_servo", "y_servo", "stuck_ball", "sensor", "communication_lost"];
@@ -17,8 +17,8 @@ export const CHANGES: Record<AlarmChange, string> = {
 export const alarmCodeTitle = (code: AlarmCode) =>
   code === "communication_lost" ? "No data" : codeTitle(code);
 
-export const alarmTitle = ({ code, kind }: Pick<Alarm, "code" | "kind">) =>
-  alarmCodeTitle(code) + (kind ? ` (${kind})` : "");
+export const alarmTitle = ({ code, ...kind }: Pick<Alarm, "code" | "kind" | "kind_weight">) =>
+  code === "communication_lost" ? alarmCodeTitle(code) : faultTitle({ code, ...kind });
 
 /** The view that shows more of an alarm. */
 export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
@@ -26,9 +26,9 @@ export const alarmPath = ({ asset, code }: Pick<Alarm, "asset" | "code">) =>
 
 /** What an alarm is now, and the class of its look. */
 export function alarmState(
-  alarm: Pick<Alarm, "code" | "failing" | "tested" | "session_open" | "status" | "muted">,
+  alarm: Pick<Alarm, "code" | "failing" | "tested" | "session_open" | "status" | "muted" | "acknowledgement">,
 ) {
-  const { code, failing, tested, session_open, status, muted } = alarm;
+  const { code, failing, tested, session_open, status, muted, acknowledgement } = alarm;
   // Whether data arrive is tested all the same; only nobody is told.
   if (muted && code === "communication_lost") return { text: `muted by ${muted.by}`, look: "status-cleared" };
   if (muted) return { text: `not tested (muted by ${muted.by})`, look: "status-cleared" };
@@ -39,6 +39,8 @@ export function alarmState(
     return { text: isNow ? "△ suspected" : "suspected when last tested", look: "status-pending" };
   if (failing && code === "communication_lost") return { text: "▲ no data now", look: "status-confirmed" };
   if (failing) return { text: isNow ? "▲ failing" : "▲ failed when last tested", look: "status-confirmed" };
-  if (status === "healed") return { text: "healed", look: "status-healed" };
+  const isUnseen = code !== "communication_lost" && !acknowledgement;
+  if (status === "healed")
+    return { text: isUnseen ? "healed, not acknowledged" : "healed", look: "status-healed" };
   return { text: `passing again; was ${statusWord(status)}`, look: "status-pending" };
 }

@@ -1,5 +1,5 @@
 /** Titles and descriptions of the fault codes and fault kinds of the service. */
-import type { FaultCode, FaultKind } from "../api/types";
+import type { Candidate, FaultCode, FaultKind } from "../api/types";
 
 const CODE: Record<FaultCode, { title: string; meaning: string }> = {
   x_servo: { title: "X servo", meaning: "moves the ball along x by turning the plate about y (qy)" },
@@ -82,10 +82,36 @@ const FAULT: Record<FaultCode, KindWords> = {
   sensor: { meaning: "the readings are implausible", past: "the readings were implausible" },
 };
 
+/** A fault with its kind, and how likely this kind is: its weight, or the candidates with theirs. */
+export interface Finding {
+  code: FaultCode;
+  kind?: FaultKind | null;
+  kind_weight?: number | null;
+  candidates?: Candidate[];
+}
+
+/** Weight from which on a kind is stated as a fact. */
+const SURE = 0.8;
+
+/** Returns the weight of a kind that is only probable, in %; undefined for one that is sure, or without a kind. */
+function doubt({ kind, kind_weight, candidates }: Finding): number | undefined {
+  const weight = kind_weight ?? candidates?.find((each) => each.kind === kind)?.weight ?? 1;
+  return kind && weight < SURE ? Math.round(weight * 100) : undefined;
+}
+
+/** Returns the kind of a fault: `dead`, or `probably dead, 51 %`. */
+export function kindText(fault: Finding, isShort = false): string {
+  const percent = doubt(fault);
+  if (percent === undefined) return fault.kind ?? "";
+  return `probably ${fault.kind}${isShort ? "" : `, ${percent} %`}`;
+}
+
 /** Returns what is wrong with the rig, or was if the test of the fault passes again. */
-export function faultMeaning(code: FaultCode, kind?: FaultKind | null, isOver = false): string {
+export function faultMeaning(fault: Finding, isOver = false): string {
+  const { code, kind } = fault;
   const words = kind ? KIND[kind] : FAULT[code];
-  return words?.[isOver ? "past" : "meaning"] ?? plain(kind ?? code);
+  const meaning = words?.[isOver ? "past" : "meaning"] ?? plain(kind ?? code);
+  return doubt(fault) === undefined ? meaning : `probably ${meaning}`;
 }
 
 export const codeMeaning = (code: FaultCode) => CODE[code]?.meaning ?? "";
@@ -97,5 +123,6 @@ export const kindMeaning = (kind?: FaultKind | null) =>
 export const injectedMeaning = (kind: string) =>
   isFaultKind(kind) ? (KIND[kind].injected ?? KIND[kind].meaning) : null;
 
-export const faultTitle = (code: FaultCode, kind?: FaultKind | null) =>
-  codeTitle(code) + (kind ? ` (${kind})` : "");
+/** Returns the title of a fault with its kind, and without the weight of the kind if it `isShort`. */
+export const faultTitle = (fault: Finding, isShort = false) =>
+  codeTitle(fault.code) + (fault.kind ? ` (${kindText(fault, isShort)})` : "");

@@ -1,6 +1,6 @@
 /** The verdict of a session as text. */
 import type { Candidate, FaultCode, FaultLine, JudgedMonitor, Outcome, Summary } from "../api/types";
-import { codeTitle, faultTitle } from "./fault-names";
+import { codeTitle, faultTitle, kindText } from "./fault-names";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
 
@@ -15,12 +15,12 @@ export const judgedShare = (monitor: { judged_share?: number; judged_s?: number 
 export function ambiguousCauses(candidates: Candidate[]): string {
   if (!candidates.some(({ code }) => code !== candidates[0]!.code)) return "";
   const [first, ...others] = candidates.map(
-    ({ code, kind, weight }) => `${faultTitle(code, kind)} ${Math.round(weight * 100)} %`,
+    ({ code, kind, weight }) => `${faultTitle({ code, kind })} ${Math.round(weight * 100)} %`,
   );
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
-type Finding = Pick<FaultLine, "code" | "kind" | "status">;
+type Finding = Pick<FaultLine, "code" | "kind" | "status"> & Partial<Pick<FaultLine, "candidates">>;
 
 const RESULTS: Partial<Record<Outcome, string>> = { pending: "suspected", "not learnt": "not calibrated" };
 
@@ -37,8 +37,8 @@ const hasTest = (code: string, profile?: string | null) => profile !== "textbook
 function faultText(summary: Summary, code: FaultCode, lines: Finding[]): string {
   const monitor = summary.monitors?.find((each) => each.code === code && each.outcome === "cannot tell");
   const confirmed = lines.filter((line) => line.code === code && line.status === "confirmed");
-  const kinds = new Set(confirmed.flatMap(({ kind }) => (kind ? [kind] : [])));
-  const named = kinds.size ? ` (${[...kinds].join(", later ")})` : "";
+  const kinds = new Map(confirmed.flatMap((line) => (line.kind ? [[line.kind, kindText(line)]] : [])));
+  const named = kinds.size ? ` (${[...kinds.values()].join(", later ")})` : "";
   return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code) + named;
 }
 

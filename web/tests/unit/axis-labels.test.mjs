@@ -1,7 +1,7 @@
 // The numbers along the axes of charts.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { valueLabels, valueRange } from "../../src/parts/charts/axis-labels.ts";
+import { extentOf, valueLabels, valueRange } from "../../src/parts/charts/axis-labels.ts";
 
 test("neighbouring labels differ, and zero has no sign", () => {
   assert.deepEqual(valueLabels([-0.02, -0.0, 0.02], 0.02, 1), ["−0.02", "0.00", "0.02"]);
@@ -23,4 +23,15 @@ test("the range has the values and zero, and one of its own without any", () => 
   assert.deepEqual(valueRange(null, null, 0, false), [-1, 1]);
   assert.deepEqual(valueRange(Infinity, -Infinity, 100, false), [-116, 116]);
   assert.equal(valueRange(-5, 10, 0, true)[0], -0.8);
+});
+
+test("charts of one scale know the extent of all their lines", () => {
+  assert.deepEqual(
+    extentOf([
+      [1, null, 3],
+      [-2, undefined, 0],
+    ]),
+    [-2, 3],
+  );
+  assert.equal(extentOf([[null], []]), undefined);
 });

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import { afterEvent, healthOf, withLine } from "../../src/pages/fleet/fleet-state.ts";
+import { healthOf as healthOnRigPage } from "../../src/pages/asset/health.ts";
 import { alarmState } from "../../src/words/alarm.ts";
 import { communicationText } from "../../src/words/communication.ts";
 
@@ -74,4 +75,19 @@ test("a rig is tested while only its lost communication is muted", () => {
   assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ no data now");
   const passing = { ...failing, failing: false };
   assert.equal(alarmState({ ...passing, status: "pending" }).text, "passing again; was suspected");
+});
+
+test("after the page has lost the connection, the health of a rig is not known", () => {
+  const onRecord = { code: "x_servo", status: "confirmed", status_byte: "2E" };
+  const known = { isConnected: false, isSilent: false, isLearnt: true };
+  assert.equal(healthOnRigPage([onRecord], undefined, { ...known, isLost: true }), "unknown");
+  assert.equal(healthOnRigPage([onRecord], undefined, { ...known, isLost: false }), "recorded");
+});
+
+test("a fault that healed before anybody acknowledged it says so", () => {
+  const healed = { code: "x_servo", status: "healed", failing: false, tested: true, session_open: true };
+  assert.equal(alarmState(healed).text, "healed, not acknowledged");
+  const acknowledgement = { by: "ada", at: SINCE };
+  assert.equal(alarmState({ ...healed, acknowledgement }).text, "healed");
+  assert.equal(alarmState({ ...healed, code: "communication_lost" }).text, "healed", "data arrive again");
 });

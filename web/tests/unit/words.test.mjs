@@ -4,21 +4,12 @@ import { test } from "node:test";
 import { faultMark } from "../../src/parts/charts/fault-marks.ts";
 import { refusal } from "../../src/parts/login/rights.ts";
 import { dimensions, hasDefaultDimensions } from "../../src/words/dimensions.ts";
-import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
 import { changeOf, chipClass, stateText } from "../../src/words/fault-state.ts";
 import { jobText } from "../../src/words/job.ts";
 import { deliverySummary, lineSentence, sentence } from "../../src/words/sentence.ts";
 import { healthByFaults, severity } from "../../src/words/severity.ts";
 import { isFailing, STATUS_BITS } from "../../src/words/status-byte.ts";
 import { ambiguousCauses, judgedShare, verdict } from "../../src/words/verdict.ts";
-
-test("known codes and kinds have titles, unknown ones are shown as plain text", () => {
-  assert.equal(faultTitle("x_servo", "gain"), "X servo (gain)");
-  assert.equal(faultTitle("x_servo"), "X servo");
-  assert.equal(codeTitle("new_code"), "new code");
-  assert.equal(kindMeaning("new_kind"), "new kind");
-  assert.equal(kindMeaning(null), "the kind of fault is not known");
-});
 
 test("a job that waits tells for what, another one what it does", () => {
   assert.equal(jobText({ waits: null }, "Judging"), "Judging…");
@@ -83,12 +74,6 @@ test("a test that passes again is told as a repair and not as an alarm", () => {
     label: "X servo passes again",
     colour: "good",
   });
-});
-
-test("a banner says what is wrong, also if the kind is not known", () => {
-  assert.equal(faultMeaning("x_servo", "dead"), "does not respond: the plate returns to zero");
-  assert.equal(faultMeaning("x_servo", "dead", true), "did not respond: the plate returned to zero");
-  assert.equal(faultMeaning("sensor"), "the readings are implausible");
 });
 
 test("dimensions are named, and the defaults recognized", () => {

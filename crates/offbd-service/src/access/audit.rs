@@ -13,13 +13,15 @@ pub struct AuditEntry {
     pub target: String,
     /// The client's address; `None` for a command on the machine itself.
     pub address: Option<String>,
+    /// The name that the request gives as that of the person; it counts only without a token.
+    pub by: Option<String>,
 }
 
 impl AuditEntry {
     /// The row that is stored; `actor` is a token's name and id.
     #[must_use]
     pub fn row(self, actor: (&str, Option<&str>), at: Micros) -> AuditRow {
-        let Self { action, target, address } = self;
+        let Self { action, target, address, .. } = self;
         let id = Uuid::now_v7().to_string();
         let (actor, token) = (actor.0.to_owned(), actor.1.map(str::to_owned));
         AuditRow { id, at, actor, token, act: action, target, address }

@@ -109,7 +109,7 @@ impl Asset {
                 self.activate_calibration(calibration, &id, Some(ACTOR.to_owned()), turn)?;
                 let target = format!("/api/v1/assets/{}/calibrations/{id}", self.row.name);
                 let action = "refine_calibration".to_owned();
-                let entry = AuditEntry { action, target, address: None };
+                let entry = AuditEntry { action, target, address: None, by: None };
                 let row = entry.row((ACTOR, None), turn.at);
                 turn.writes.push(Write::Access(AccessWrite::Audit(row)));
             }

@@ -91,9 +91,13 @@ impl<T: NotificationTransport> Context<T> {
         let now = self.handles.clock.now();
         let (position, mut deliveries) = (events.last().map(|event| event.id), Vec::new());
         let mut reminders = Vec::new();
-        for row in events {
+        let mut events = events.into_iter().peekable();
+        while let Some(row) = events.next() {
             let Ok(document) = serde_json::from_str::<Value>(&row.document) else { continue };
             let Some(event) = AlarmEvent::of(&document) else { continue };
+            if events.peek().is_some_and(|next| is_named_by(&row, &document, next)) {
+                continue;
+            }
             let is_concerned = |rule: &&&ActiveRule| rule.concerns(&row.asset, event.code, tags);
             let concerned: Vec<_> = rules.iter().filter(is_concerned).collect();
             let is_muted = self.mutes.of(&row.asset, event.code, now).is_some();
@@ -110,6 +114,17 @@ impl<T: NotificationTransport> Context<T> {
         let plan = NotificationWrite::Plan { channel: channel.id.clone(), position, deliveries };
         std::iter::once(plan).chain(reminders).map(Write::Notification).collect()
     }
+}
+
+/// Returns whether `next` only adds the kind to the confirmed fault of `row`: both are one message.
+fn is_named_by(row: &PlannedEventRow, document: &Value, next: &PlannedEventRow) -> bool {
+    let Ok(named) = serde_json::from_str::<Value>(&next.document) else { return false };
+    let is_same = |key: &str| document.get(key) == named.get(key);
+    row.asset == next.asset
+        && row.session == next.session
+        && ["code", "status", "status_byte", "onset_s"].into_iter().all(is_same)
+        && document.get("kind").is_none_or(Value::is_null)
+        && named.get("kind").is_some_and(Value::is_string)
 }
 
 /// Returns the change of a rule's reminder that an event causes: a failure of which the rule
@@ -222,5 +237,33 @@ pub(crate) fn delivery(
         due_at: now,
         finished_at: None,
         error: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn a_confirmation_and_its_kind_are_one_message() {
+        let document = |kind: Option<&str>, byte: &str| {
+            json!({ "code": "x_servo", "status": "confirmed", "status_byte": byte,
+                "onset_s": 1.5, "kind": kind })
+        };
+        let row = |asset: &str, document: Value| PlannedEventRow {
+            id: 1,
+            asset: asset.to_owned(),
+            session: Some("s".to_owned()),
+            at: 0,
+            document: document.to_string(),
+        };
+        let unnamed = document(None, "2F");
+        let is_named_by =
+            |next: PlannedEventRow| is_named_by(&row("a", unnamed.clone()), &unnamed, &next);
+        assert!(is_named_by(row("a", document(Some("dead"), "2F"))));
+        assert!(!is_named_by(row("a", document(None, "2F"))), "no kind");
+        assert!(!is_named_by(row("a", document(Some("dead"), "2E"))), "it passes again");
+        assert!(!is_named_by(row("b", document(Some("dead"), "2F"))), "another rig");
     }
 }

@@ -16,6 +16,7 @@ use offbd_wire::alarm::{
 };
 use offbd_wire::provenance::ActView;
 use offbd_wire::service::{FaultEntryView, Page};
+use offbd_wire::verdict::kind_weight;
 use offbd_wire::words::{AlarmCodeWord, AlarmStateFilter, EvidenceWord, StatusWord};
 
 /// Alarms that one request acknowledges; a request with more is refused.
@@ -193,6 +194,10 @@ impl Service {
             asset,
             code,
             kind: record.kind,
+            kind_weight: kind_weight(
+                record.kind,
+                record.candidates.iter().map(|each| (each.kind, each.weight)),
+            ),
             status: record.status,
             failing: record.status_bits.test_failed,
             tested: !record.status_bits.test_not_completed_this_operation_cycle,
@@ -223,6 +228,7 @@ impl Service {
             asset: row.asset,
             code,
             kind: None,
+            kind_weight: None,
             status: if is_lost { StatusWord::Confirmed } else { StatusWord::Healed },
             failing: is_lost,
             tested: true,

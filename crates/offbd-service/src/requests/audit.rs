@@ -7,7 +7,7 @@ use offbd_store::{AccessWrite, AuditRow, LAST_ID, Write};
 use offbd_wire::access::AuditView;
 use offbd_wire::service::Page;
 
-/// The actor in the audit log if authentication is off.
+/// The actor in the audit log if authentication is off and the request names nobody.
 const ANONYMOUS: &str = "anyone";
 
 impl Service {
@@ -21,8 +21,9 @@ impl Service {
         entry: AuditEntry,
     ) -> Result<(), ServiceError> {
         let principal = caller.principal();
-        let actor =
-            (caller.name().unwrap_or(ANONYMOUS), principal.map(|principal| principal.id.as_str()));
+        let by = entry.by.clone();
+        let name = caller.name().or(by.as_deref()).unwrap_or(ANONYMOUS);
+        let actor = (name, principal.map(|principal| principal.id.as_str()));
         let row = entry.row(actor, self.inner.handles.clock.now());
         self.inner.handles.write_unpartitioned(Write::Access(AccessWrite::Audit(row))).await
     }

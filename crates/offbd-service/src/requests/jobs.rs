@@ -1,9 +1,15 @@
 //! The queues of background jobs.
 
 use crate::asset::LEARNING_ACTOR;
+use crate::clock::rfc3339;
 use crate::job::{CancelledJob, Job, JobRoom};
 use crate::{Service, ServiceError};
 use offbd_store::PartitionId;
+use offbd_wire::service::{JobView, Page};
+use offbd_wire::words::{JobKind, JobState};
+
+/// Listed jobs of a queue; of a longer one, the rest is left out.
+const MAX_LISTED: usize = 100;
 
 impl Service {
     /// Queues the jobs that a previous process left unfinished: of the partitions `owned`, or
@@ -22,6 +28,52 @@ impl Service {
             queue.resume(Job::Calibration(id));
         }
         Ok(())
+    }
+
+    /// Lists the jobs of this node that run or wait, at most 100 of each queue: those that persons
+    /// asked for, then those that rigs started by themselves.
+    ///
+    /// # Errors
+    /// [`ServiceError::Outage`] if the store does not answer.
+    pub async fn list_jobs(&self) -> Result<Page<JobView>, ServiceError> {
+        let jobs = &self.inner.jobs;
+        let mut items = Vec::new();
+        for (queue, automatic) in [(&jobs.asked, false), (&jobs.automatic, true)] {
+            for job in queue.list().into_iter().take(MAX_LISTED) {
+                items.extend(self.view_job(&job, automatic).await?);
+            }
+        }
+        Ok(Page { items, next: None })
+    }
+
+    /// Returns `None` for a job that has ended meanwhile.
+    async fn view_job(&self, job: &Job, automatic: bool) -> Result<Option<JobView>, ServiceError> {
+        let store = &self.inner.handles.store;
+        let (kind, asset, session_id, created_at) = match job {
+            Job::Replay(id) => {
+                let Some(row) = store.replay(id).await? else { return Ok(None) };
+                let Some(asset) = self.asset_of_session(&row.session).await? else {
+                    return Ok(None);
+                };
+                (JobKind::Replay, asset, Some(row.session), row.created_at)
+            }
+            Job::Calibration(id) => {
+                let Some(row) = store.calibration(id).await? else { return Ok(None) };
+                (JobKind::Calibration, row.asset, None, row.made_at)
+            }
+        };
+        let waits = self.inner.jobs.wait(job.id());
+        Ok(Some(JobView {
+            id: job.id().to_owned(),
+            kind,
+            asset,
+            session_id,
+            automatic,
+            state: if waits.is_some() { JobState::Queued } else { JobState::Running },
+            progress: self.inner.job_context.progress.get(job.id()),
+            waits,
+            created_at: rfc3339(created_at),
+        }))
     }
 
     /// Reserves room in the queue of what persons ask for, before a job is stored.

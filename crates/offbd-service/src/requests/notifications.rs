@@ -150,6 +150,12 @@ impl Service {
         self.change_notifications(NotificationWrite::DeleteChannel { id: row.id }).await
     }
 
+    /// Returns whether messages have links to the dashboard.
+    #[must_use]
+    pub fn has_public_url(&self) -> bool {
+        self.inner.limits.notifications.public_url.is_some()
+    }
+
     /// Puts a test message into the queue of a channel.
     ///
     /// # Errors

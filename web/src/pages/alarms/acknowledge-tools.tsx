@@ -1,5 +1,6 @@
 import { ActionButton } from "../../parts/action-button";
 import { ActorField, useActor } from "../../parts/actor-field";
+import { ConfirmButton } from "../../parts/confirm-button";
 
 interface Props {
   /** How many alarms are chosen that nobody has acknowledged yet. */
@@ -7,7 +8,7 @@ interface Props {
   acknowledge: () => Promise<void>;
 }
 
-/** The button that acknowledges the chosen alarms, and the name that is recorded with it. */
+/** The button that acknowledges the chosen alarms, several of them after a question. */
 export function AcknowledgeTools({ open, acknowledge }: Props) {
   const actor = useActor();
   const acknowledgeAsActor = () => {
@@ -17,9 +18,22 @@ export function AcknowledgeTools({ open, acknowledge }: Props) {
   return (
     <>
       <ActorField actor={actor} />
-      <ActionButton class="primary" disabled={!open} action={acknowledgeAsActor} needs="operator">
-        Acknowledge {open || ""}
-      </ActionButton>
+      {open > 1 ? (
+        <ConfirmButton
+          class="primary"
+          word={`Acknowledge ${open}`}
+          question={`Acknowledge ${open} alarms?`}
+          action={acknowledgeAsActor}
+          needs="operator"
+        >
+          It is recorded that you have seen them, and they are no longer repeated to anybody. This cannot be
+          taken back; a fault that occurs again is unacknowledged.
+        </ConfirmButton>
+      ) : (
+        <ActionButton class="primary" disabled={!open} action={acknowledgeAsActor} needs="operator">
+          Acknowledge {open || ""}
+        </ActionButton>
+      )}
     </>
   );
 }

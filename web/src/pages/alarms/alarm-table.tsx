@@ -1,9 +1,13 @@
 import type { Advice, Alarm } from "../../api/alarms";
 import { AlarmRow } from "./alarm-row";
+import type { AlarmGroup } from "./arranged";
 import { alarmKey } from "./use-alarms";
 
 interface Props {
+  /** All alarms that are chosen by the box in the head. */
   alarms: Alarm[];
+  /** Those that are shown. */
+  groups: AlarmGroup[];
   now: number;
   advice?: Advice;
   refetchAdvice: () => Promise<unknown>;
@@ -11,7 +15,7 @@ interface Props {
   choose: (chosen: Set<string>) => void;
 }
 
-export function AlarmTable({ alarms, now, advice, refetchAdvice, chosen, choose }: Props) {
+export function AlarmTable({ alarms, groups, now, advice, refetchAdvice, chosen, choose }: Props) {
   const open = alarms.filter((alarm) => !alarm.acknowledgement).map(alarmKey);
   const areAllChosen = open.length > 0 && open.every((key) => chosen.has(key));
   const toggle = (key: string) => {
@@ -22,38 +26,64 @@ export function AlarmTable({ alarms, now, advice, refetchAdvice, chosen, choose 
   return (
     <div class="scroll">
       <table class="list alarms">
-        <thead>
-          <tr>
-            <th>
-              <input
-                type="checkbox"
-                aria-label="Choose all that are unacknowledged"
-                checked={areAllChosen}
-                disabled={!open.length}
-                onChange={() => choose(new Set(areAllChosen ? [] : open))}
-              />
-            </th>
-            <th>Rig</th>
-            <th>Fault</th>
-            <th>State</th>
-            <th>Began</th>
-            <th>Acknowledged</th>
-          </tr>
-        </thead>
+        <Head
+          areAllChosen={areAllChosen}
+          isDisabled={!open.length}
+          choose={() => choose(new Set(areAllChosen ? [] : open))}
+        />
         <tbody>
-          {alarms.map((alarm) => (
-            <AlarmRow
-              key={alarmKey(alarm)}
-              alarm={alarm}
-              now={now}
-              advice={advice}
-              refetchAdvice={refetchAdvice}
-              isChosen={chosen.has(alarmKey(alarm))}
-              toggle={() => toggle(alarmKey(alarm))}
-            />
+          {groups.map(({ heading, alarms }) => (
+            <>
+              {heading && (
+                <tr class="group">
+                  <th colSpan={6} scope="rowgroup">
+                    {heading} <span class="quiet">({alarms.length})</span>
+                  </th>
+                </tr>
+              )}
+              {alarms.map((alarm) => (
+                <AlarmRow
+                  key={alarmKey(alarm)}
+                  alarm={alarm}
+                  now={now}
+                  advice={advice}
+                  refetchAdvice={refetchAdvice}
+                  isChosen={chosen.has(alarmKey(alarm))}
+                  toggle={() => toggle(alarmKey(alarm))}
+                />
+              ))}
+            </>
           ))}
         </tbody>
       </table>
     </div>
   );
 }
+
+interface HeadProps {
+  areAllChosen: boolean;
+  isDisabled: boolean;
+  /** Chooses all alarms that are unacknowledged, or none. */
+  choose: () => void;
+}
+
+const Head = ({ areAllChosen, isDisabled, choose }: HeadProps) => (
+  <thead>
+    <tr>
+      <th>
+        <input
+          type="checkbox"
+          aria-label="Choose all that are unacknowledged"
+          checked={areAllChosen}
+          disabled={isDisabled}
+          onChange={choose}
+        />
+      </th>
+      <th>Rig</th>
+      <th>Fault</th>
+      <th>State</th>
+      <th>Began</th>
+      <th>Acknowledged</th>
+    </tr>
+  </thead>
+);

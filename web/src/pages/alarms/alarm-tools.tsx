@@ -2,8 +2,10 @@ import type { AlarmFilter } from "../../api/alarms";
 import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
 import { Choice } from "../../parts/choice";
+import { Filters } from "../../parts/filters";
 import { TagChoice } from "../../parts/tag-choice";
 import type { AlarmKey } from "./alarm-filter";
+import { GROUPS, ORDERS } from "./arranged";
 import { FaultChoice } from "./fault-choice";
 import { LastChangeChoice } from "./last-change-choice";
 
@@ -14,18 +16,21 @@ const STATES = [
   ["all", "All, including healed"],
 ] as const;
 
+/** The parameters that select or order alarms. */
+const KEYS: AlarmKey[] = ["state", "code", "hours", "rig", "tag", "acknowledged", "sort", "group"];
+
 interface Props {
   filter: AlarmFilter;
-  /** The range of the last change, hours back; empty for any time. */
-  hours: string;
+  /** The value of a parameter of the address; empty if it is missing. */
+  word: (key: AlarmKey) => string;
   change: (key: AlarmKey, value: string) => void;
 }
 
-/** The filter of the list. */
-export function AlarmTools({ filter, hours, change }: Props) {
+/** The filter, order and grouping of the list. */
+export function AlarmTools({ filter, word, change }: Props) {
   const { data: tags } = useQuery(tagApi.inUse, "tags");
   return (
-    <div class="form-row">
+    <Filters n={KEYS.filter(word).length}>
       <Choice<string>
         label="State"
         options={STATES}
@@ -33,17 +38,29 @@ export function AlarmTools({ filter, hours, change }: Props) {
         change={(state) => change("state", state)}
       />
       <FaultChoice code={filter.code} change={(code) => change("code", code ?? "")} />
-      <LastChangeChoice hours={hours} change={(hours) => change("hours", hours)} />
+      <LastChangeChoice hours={word("hours")} change={(hours) => change("hours", hours)} />
       <label>
         Rig
         <input
           type="search"
-          placeholder="whole name"
-          value={filter.asset ?? ""}
-          onChange={(e) => change("asset", e.currentTarget.value.trim())}
+          placeholder="part of its name"
+          value={word("rig")}
+          onInput={(e) => change("rig", e.currentTarget.value.trim())}
         />
       </label>
       <TagChoice isAbove tags={tags ?? []} chosen={filter.tag ?? ""} change={(tag) => change("tag", tag)} />
+      <Choice<string>
+        label="Order"
+        options={Object.entries(ORDERS)}
+        value={word("sort")}
+        change={(sort) => change("sort", sort)}
+      />
+      <Choice<string>
+        label="Group by"
+        options={Object.entries(GROUPS)}
+        value={word("group")}
+        change={(group) => change("group", group)}
+      />
       <label class="check">
         <input
           type="checkbox"
@@ -52,6 +69,6 @@ export function AlarmTools({ filter, hours, change }: Props) {
         />
         Unacknowledged only
       </label>
-    </div>
+    </Filters>
   );
 }

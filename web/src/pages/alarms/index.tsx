@@ -1,28 +1,25 @@
 /** The alarms of the fleet: what fails now, what is on record, and what to do. */
-import { alarmApi } from "../../api/alarms";
-import { useNow } from "../../hooks/use-now";
-import { useQuery } from "../../hooks/use-query";
 import { useTitle, withNumber } from "../../hooks/use-title";
-import { ActionButton } from "../../parts/action-button";
 import { EmptyState } from "../../parts/empty-state";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
 import { SavedViews } from "../../parts/saved-views/saved-views";
 import { Link } from "../../router/link";
 import { AcknowledgeTools } from "./acknowledge-tools";
-import { AlarmTable } from "./alarm-table";
+import { AlarmList } from "./alarm-list";
 import { AlarmTools } from "./alarm-tools";
+import { chosenAlarms } from "./arranged";
+import { UnseenNote } from "./unseen-note";
 import { useAcknowledge } from "./use-acknowledge";
 import { useAlarmFilter } from "./use-alarm-filter";
 import { useAlarms } from "./use-alarms";
 
 export function AlarmsPage() {
-  const { filter, hours, change } = useAlarmFilter();
-  const { alarms, error, refetch, loadMore } = useAlarms(filter);
-  useTitle(withNumber("Alarms", alarms?.length ?? 0, loadMore !== undefined));
-  const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms ?? [], refetch);
-  const advice = useQuery(alarmApi.advice, "advice");
-  const now = useNow();
+  const { filter, word, change } = useAlarmFilter();
+  const { alarms: all, error, refetch } = useAlarms(filter);
+  const alarms = chosenAlarms(all ?? [], word("rig"), word("sort"));
+  useTitle(withNumber("Alarms", alarms.length));
+  const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms, refetch);
   return (
     <main>
       <header class="page-head">
@@ -33,33 +30,22 @@ export function AlarmsPage() {
           <AcknowledgeTools open={open} acknowledge={acknowledge} />
         </div>
       </header>
-      <AlarmTools filter={filter} hours={hours} change={change} />
+      <AlarmTools filter={filter} word={word} change={change} />
       <ErrorMessage error={error} retry={refetch} />
+      <UnseenNote isListed={filter.state === "all"} />
       {refused.length > 0 && (
         <p class="trouble" role="alert">
           Not acknowledged: {refused.join("; ")}
         </p>
       )}
-      {!alarms && !error && <Loading what="the alarms" />}
-      {alarms?.length === 0 && (
+      {!all && !error && <Loading what="the alarms" />}
+      {all && !alarms.length && (
         <EmptyState title="No alarms">
           <p>No alarm matches this filter.</p>
         </EmptyState>
       )}
-      {alarms && alarms.length > 0 && (
-        <AlarmTable
-          alarms={alarms}
-          now={now}
-          advice={advice.data}
-          refetchAdvice={advice.refetch}
-          chosen={chosen}
-          choose={choose}
-        />
-      )}
-      {loadMore && (
-        <p>
-          <ActionButton action={loadMore}>Show more</ActionButton>
-        </p>
+      {alarms.length > 0 && (
+        <AlarmList alarms={alarms} group={word("group")} chosen={chosen} choose={choose} />
       )}
     </main>
   );

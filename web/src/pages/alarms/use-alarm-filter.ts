@@ -2,11 +2,11 @@ import { useMemo } from "preact/hooks";
 import { navigate, useLocation } from "../../router/navigation";
 import { alarmFilter, type AlarmKey } from "./alarm-filter";
 
-/** The filter in the address, and its change. */
+/** The filter, order and grouping in the address, and their change. */
 export function useAlarmFilter() {
   const { query } = useLocation();
   const text = query.toString();
-  // The same filter as long as the address is the same, so that further pages belong to it.
+  // The same filter as long as the address is the same, so that the start of its time range stays.
   const filter = useMemo(() => alarmFilter(new URLSearchParams(text), Date.now()), [text]);
   const change = (key: AlarmKey, value: string) => {
     const next = new URLSearchParams(text);
@@ -14,5 +14,6 @@ export function useAlarmFilter() {
     else next.delete(key);
     navigate(`/alarms${next.size ? `?${next}` : ""}`, true);
   };
-  return { filter, hours: query.get("hours") ?? "", change };
+  const word = (key: AlarmKey) => query.get(key) ?? "";
+  return { filter, word, change };
 }

@@ -19,17 +19,17 @@ export function ActiveFaults({ asset, faults, hasSession }: Props) {
   return (
     <ul class="banner-list" aria-label="Active faults">
       {faults.map((fault) => {
-        const { code, kind, candidates, last_occurrence } = fault;
+        const { code, candidates, last_occurrence } = fault;
         const state = stateOf(fault);
         return (
           <li>
             <Link to={faultPath(asset, code)} class={`banner banner-${standing(state)}`}>
               <FaultChip
-                fault={{ ...state, code, kind }}
+                fault={{ ...fault, ...state }}
                 hasSession={hasSession}
                 since={last_occurrence?.noted_at}
               />{" "}
-              <span>{ambiguousCauses(candidates) || faultMeaning(code, kind, !state.failing)}</span>{" "}
+              <span>{ambiguousCauses(candidates) || faultMeaning(fault, !state.failing)}</span>{" "}
               <span class="more">Look at it →</span>
             </Link>
           </li>

@@ -3,6 +3,7 @@ import { ConfirmButton } from "../../parts/confirm-button";
 import { HealthMark } from "../../parts/health-mark";
 import { Link } from "../../router/link";
 import { calibrationsPath, sessionsPath, setUpPath } from "../../router/paths";
+import { AFTER_THE_END } from "../../words/session";
 import type { RigHealth } from "../../words/severity";
 import { DeleteRig } from "./delete-rig";
 import { RigTags } from "./rig-tags";
@@ -43,7 +44,7 @@ export function AssetHeader({ name, health, session }: Props) {
             action={() => api.endSession(session)}
             needs="operator"
           >
-            Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.
+            Its verdict becomes final. {AFTER_THE_END}
           </ConfirmButton>
         )}
         <DeleteRig name={name} />

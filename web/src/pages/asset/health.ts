@@ -10,6 +10,8 @@ export const activeFaults = (faults: FaultEntry[]) =>
 interface Known {
   /** Whether the page receives the states of the rig. */
   isConnected: boolean;
+  /** Whether the page has lost the connection, so that it knows nothing of the present. */
+  isLost: boolean;
   /** Whether no sample has arrived for some time, or communication with the rig is lost. */
   isSilent: boolean;
   /** Whether the rig has a calibration. */
@@ -19,8 +21,9 @@ interface Known {
 export function healthOf(
   faults: FaultEntry[],
   state: State | undefined,
-  { isConnected, isSilent, isLearnt }: Known,
+  { isConnected, isLost, isSilent, isLearnt }: Known,
 ): RigHealth {
+  if (isLost) return "unknown";
   const muted = (state?.monitors ?? []).filter((monitor) => monitor.muted).map(({ code }) => code);
   const byFaults = healthByFaults(faults.filter(({ code }) => !muted.includes(code)).map(stateOf));
   if (byFaults) return byFaults;

@@ -52,8 +52,10 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
   const { state, connection, isSilent, isStill, charts } = useLiveRig(asset.name, () => void refetch());
   const trends = useTrends(asset.name);
   const active = activeFaults(faults);
+  const isLost = connection === "lost";
   const health = healthOf(active, state, {
     isConnected: connection === "live",
+    isLost,
     isSilent: isSilent || lost !== undefined,
     isLearnt: asset.calibration != null,
   });
@@ -61,9 +63,9 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
   return (
     <main class="asset">
       <AssetHeader name={asset.name} health={health} session={state?.session_id} />
-      <Notices isLost={connection === "lost"} state={state} />
+      <Notices isLost={isLost} state={state} />
       {lost && <LostCommunication alarm={lost} refetch={refetch} />}
-      <ActiveFaults asset={asset.name} faults={active} hasSession={state?.session_id != null} />
+      <ActiveFaults asset={asset.name} faults={active} hasSession={!isLost && state?.session_id != null} />
       <TrendWarnings trends={trends.data} />
       <LearningCard
         name={asset.name}

@@ -1,4 +1,4 @@
-import { useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
 import { ActionButton } from "../../parts/action-button";
@@ -44,6 +44,7 @@ interface DialogProps {
 
 function TagsDialog({ asset, tags, changed, close }: DialogProps) {
   const [text, setText] = useState(tags.join(" "));
+  const saveButton = useRef<HTMLDivElement>(null);
   const save = async () => {
     await tagApi.put(asset, tagsIn(text));
     await changed();
@@ -53,10 +54,14 @@ function TagsDialog({ asset, tags, changed, close }: DialogProps) {
     <Dialog title={`Tags of ${asset}`} close={close}>
       <label>
         Tags, separated by blanks
-        <input value={text} onInput={(e) => setText(e.currentTarget.value)} />
+        <input
+          value={text}
+          onInput={(e) => setText(e.currentTarget.value)}
+          onKeyDown={(e) => e.key === "Enter" && saveButton.current?.querySelector("button")?.click()}
+        />
       </label>
       <p class="quiet">At most 20 words of letters, digits, “-”, “_” and “.”, such as a room or a line.</p>
-      <div class="form-end">
+      <div class="form-end" ref={saveButton}>
         <ActionButton class="primary" action={save} needs="operator">
           Save
         </ActionButton>

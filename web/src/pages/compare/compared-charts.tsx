@@ -1,7 +1,7 @@
 import { useEffect, useMemo } from "preact/hooks";
 import type { Axis } from "../../api/types";
 import { TraceBuffer } from "../../live/buffer";
-import { ChartGroup } from "../../parts/charts/chart-group";
+import type { ChartGroup } from "../../parts/charts/chart-group";
 import type { ChartKindName } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
 import { ThinnedNote } from "../../parts/charts/thinned-note";
@@ -11,6 +11,8 @@ import { alignedMarks, alignedTrace } from "./align";
 import type { Recording } from "./use-recording";
 
 interface Props {
+  /** Draws the charts. */
+  group: ChartGroup;
   recording: Recording;
   /** Where its first moment is on the common time axis, s. */
   start: number;
@@ -21,9 +23,8 @@ interface Props {
 }
 
 /** The charts of one of the compared recordings, on the common time axis. */
-export function ComparedCharts({ recording, start, range, axis, kinds, onZoom }: Props) {
+export function ComparedCharts({ group, recording, start, range, axis, kinds, onZoom }: Props) {
   const { session, faults, trace } = recording;
-  const group = useMemo(() => new ChartGroup(), []);
   const buffer = useMemo(() => TraceBuffer.of(alignedTrace(trace, start)), [trace, start]);
   useEffect(
     () => group.setMarks(alignedMarks(faults, trace.t_s[0] ?? 0, start)),

@@ -1,6 +1,7 @@
 import { useMemo, useState } from "preact/hooks";
 import type { Axis } from "../../api/types";
 import { AXES } from "../../live/buffer";
+import { ChartGroup } from "../../parts/charts/chart-group";
 import { SESSION_CHARTS } from "../../parts/charts/chart-kinds";
 import { Choice } from "../../parts/choice";
 import { FoundCard } from "../session/found-card";
@@ -13,6 +14,13 @@ const KINDS = ["residual" as const, "counter" as const, ...SESSION_CHARTS];
 
 const AXIS_OPTIONS = AXES.map((axis) => [axis, axis] as const);
 
+/** The charts of both recordings, with the same scales. */
+function groupsOfOneScale(): [ChartGroup, ChartGroup] {
+  const groups: [ChartGroup, ChartGroup] = [new ChartGroup(), new ChartGroup()];
+  groups[0].share(groups[1]);
+  return groups;
+}
+
 interface Props {
   a: Recording;
   b: Recording;
@@ -23,6 +31,7 @@ interface Props {
 /** Two recordings on one time axis, and their verdicts. */
 export function Comparison({ a, b, shift, setShift }: Props) {
   const [axis, setAxis] = useState<Axis>("x");
+  const [groups] = useState(groupsOfOneScale);
   const [zoom, setZoom] = useState<[number, number]>();
   const whole = useMemo<[number, number]>(
     () => commonRange(alignedTrace(a.trace, 0), alignedTrace(b.trace, shift)) ?? [0, 1],
@@ -39,8 +48,8 @@ export function Comparison({ a, b, shift, setShift }: Props) {
         </button>
       </section>
       <div class="compared">
-        <ComparedCharts recording={a} start={0} {...chart} />
-        <ComparedCharts recording={b} start={shift} {...chart} />
+        <ComparedCharts group={groups[0]} recording={a} start={0} {...chart} />
+        <ComparedCharts group={groups[1]} recording={b} start={shift} {...chart} />
         {[a, b].map((one) => (
           <FoundCard session={one.session} asset={one.asset} faults={one.faults} />
         ))}

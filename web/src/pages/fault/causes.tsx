@@ -20,11 +20,11 @@ export function Causes({ fault }: { fault: FaultEntry }) {
         {candidates.map(({ code, kind, weight }) => (
           <li>
             <span>
-              <b>{faultTitle(code, kind)}</b>
+              <b>{faultTitle({ code, kind })}</b>
               <br />
               <span class="quiet">{kind ? kindMeaning(kind) : codeMeaning(code)}</span>
             </span>
-            <meter min={0} max={1} value={weight} aria-label={`Weight of ${faultTitle(code, kind)}`} />
+            <meter min={0} max={1} value={weight} aria-label={`Weight of ${faultTitle({ code, kind })}`} />
             <span class="n">{Math.round(weight * 100)} %</span>
           </li>
         ))}

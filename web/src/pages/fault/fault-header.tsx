@@ -8,7 +8,7 @@ import { FaultActions } from "./fault-actions";
 import { isActive } from "./is-active";
 
 export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: () => Promise<unknown> }) {
-  const { asset, code, kind } = fault;
+  const { asset, code } = fault;
   return (
     <header class="page-head">
       <div>
@@ -16,8 +16,7 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
           <Link to="/">Fleet</Link> / <Link to={rigPath(asset)}>{asset}</Link>
         </p>
         <h1>
-          {faultTitle(code, kind)}{" "}
-          <StatusChip fault={stateOf(fault)} hasSession={fault.session_open === true} />
+          {faultTitle(fault)} <StatusChip fault={stateOf(fault)} hasSession={fault.session_open === true} />
         </h1>
         <Link to={faultReportPath(asset, code)}>Report to print</Link>
       </div>

@@ -1,7 +1,7 @@
 import type { FaultEntry, HistoryEntry } from "../../api/types";
 import { EmptyState } from "../../parts/empty-state";
 import { codeMeaning, codeTitle, faultMeaning } from "../../words/fault-names";
-import { isRepair } from "../../words/fault-state";
+import { isRepair, repairNote } from "../../words/fault-state";
 import { capitalised, sentence } from "../../words/sentence";
 import { isFailing, isTested } from "../../words/status-byte";
 import { sinceText } from "../../words/time";
@@ -21,17 +21,17 @@ function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
   }
   const repair = history.find((entry) => entry.fault && isRepair(entry.fault));
   const passes = `Its test passes again${repair ? ` since ${sinceText(repair.at)}` : ""}`;
-  return `${passes}; it stays on record${began ? ` (last failure ${began})` : ""}.`;
+  return `${passes}; it stays on record${began ? ` (last failure ${began})` : ""}. ${repairNote(fault)}`.trimEnd();
 }
 
 /** The fault in one sentence and how it stands now, or the note that it is not active. */
 export function FaultSummary({ fault, history }: { fault: FaultEntry; history: HistoryEntry[] }) {
-  const { code, kind, status } = fault;
+  const { code, status } = fault;
   if (isActive(fault)) {
     const failure = latestFailure(history);
     const seen = failure
       ? sentence(failure.summary)
-      : `${capitalised(faultMeaning(code, kind, !isFailing(fault)))}.`;
+      : `${capitalised(faultMeaning(fault, !isFailing(fault)))}.`;
     return (
       <div>
         <p class="sentence">{seen}</p>

@@ -32,7 +32,7 @@ export function TimelineText({ entry, code }: { entry: HistoryEntry; code: Fault
   );
   return (
     <span>
-      {faultTitle(code, fault?.kind)}{" "}
+      {faultTitle(fault ?? { code })}{" "}
       {fault && isRepair(fault) ? <b class="status-passed">passes its test again</b> : <b>{EVENT[what]}</b>}
       {fault && (
         <>

@@ -20,7 +20,7 @@ function told(line: ReceivedEvent) {
   return {
     ...changeOf(line),
     sentence: lineSentence(line) + at,
-    title: faultTitle(line.code, line.kind),
+    title: faultTitle(line),
     path: faultPath(line.asset ?? "", line.code),
   };
 }

@@ -1,4 +1,5 @@
 import { Choice } from "../../parts/choice";
+import { Filters } from "../../parts/filters";
 import { TagChoice } from "../../parts/tag-choice";
 import { count } from "../../words/numbers";
 import { countRows, SORTS, type HealthFilter } from "./rows";
@@ -43,17 +44,19 @@ export function FleetTools({ view }: { view: FleetView }) {
         value={search}
         onInput={(e) => change("search", e.currentTarget.value)}
       />
-      <TagChoice tags={tags} chosen={tag} change={(chosen) => change("tag", chosen)} />
-      <Choice<string>
-        isInline
-        label="Sort"
-        options={Object.entries(SORTS)}
-        value={sort}
-        change={(key) => change("sort", key)}
-      />
-      <button type="button" onClick={() => change("layout", layout === "wall" ? "" : "wall")}>
-        {layout === "wall" ? "List view" : "Wall view"}
-      </button>
+      <Filters n={[tag, layout === "wall" ? layout : ""].filter(Boolean).length}>
+        <TagChoice tags={tags} chosen={tag} change={(chosen) => change("tag", chosen)} />
+        <Choice<string>
+          isInline
+          label="Sort"
+          options={Object.entries(SORTS)}
+          value={sort}
+          change={(key) => change("sort", key)}
+        />
+        <button type="button" onClick={() => change("layout", layout === "wall" ? "" : "wall")}>
+          {layout === "wall" ? "List view" : "Wall view"}
+        </button>
+      </Filters>
     </div>
   );
 }

@@ -13,12 +13,12 @@ function worstFinding({ entry }: FleetRow): string {
   const [drift] = entry.warnings;
   const lost = entry.communication_lost_since;
   const silence = lost ? `no data since ${sinceText(lost)}` : "";
-  if (silence && worst?.failing) return `${faultTitle(worst.code, worst.kind)}, then ${silence}`;
+  if (silence && worst?.failing) return `${faultTitle(worst, true)}, then ${silence}`;
   if (silence) return silence;
   if (!worst && drift) return `${driftTitle(drift)}: ${driftText(drift)}`;
   if (!worst) return entry.unjudged?.reason ?? entry.session ?? "";
   const since = worst.failing && worst.failed_at ? ` since ${sinceText(worst.failed_at)}` : "";
-  return faultTitle(worst.code, worst.kind) + since;
+  return faultTitle(worst, true) + since;
 }
 
 export function WallTile({ row }: { row: FleetRow }) {

@@ -38,8 +38,9 @@ export function DemoControls() {
       <DemoFaultButtons demo={demo} inject={(fault) => thenRefetch(() => api.injectDemoFault(fault))()} />
       <p class="quiet small-text">
         A fault is detected when a command depends on the broken part, mostly within one to three seconds. It
-        stays on record after the repair until you clear it on its page; a fault that is injected again is
-        cleared first, so that its detection can be watched.
+        stays on record after the repair until you clear it on its page, or it heals because enough sessions
+        without it followed; a fault that is injected again is cleared first, so that its detection can be
+        watched.
       </p>
       <DemoGains />
     </section>

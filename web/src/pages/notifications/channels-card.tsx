@@ -1,6 +1,7 @@
-import { useState } from "preact/hooks";
+import { useContext, useState } from "preact/hooks";
 import type { Channel } from "../../api/alarms";
 import { Dialog } from "../../parts/dialog";
+import { HealthContext } from "../../parts/service-health";
 import { ChannelForm } from "./channel-form";
 import { ChannelTable } from "./channel-table";
 
@@ -13,6 +14,7 @@ export function ChannelsCard({
 }) {
   const [isOpen, setOpen] = useState(false);
   const [secret, setSecret] = useState<string>();
+  const hasNoLinks = useContext(HealthContext)?.message_links === false && channels.length > 0;
   const made = (secret?: string | null) => {
     setOpen(false);
     setSecret(secret ?? undefined);
@@ -27,6 +29,12 @@ export function ChannelsCard({
           <span>
             Signing key (shown once): <code class="secret">{secret}</code>
           </span>
+        </p>
+      )}
+      {hasNoLinks && (
+        <p class="note">
+          Messages have no link to the dashboard: the setting <code>notifications.public_url</code> is
+          missing.
         </p>
       )}
       {channels.length > 0 && <ChannelTable channels={channels} refetch={refetch} />}

@@ -1,4 +1,4 @@
-import type { AlarmChange, AlarmCode, NewRule } from "../../api/alarms";
+import type { AlarmChange, AlarmCode, NewRule, Rule } from "../../api/alarms";
 
 /** What the form of a rule holds. */
 export interface RuleDraft {
@@ -24,7 +24,19 @@ export const firstDraft = (channel: string): RuleDraft => ({
   repeat: 0,
 });
 
-/** The rule that the form describes. */
-export function ruleOf({ repeat, tag, ...settings }: RuleDraft): NewRule {
-  return { ...settings, tag: tag.trim() || null, repeat_s: repeat || null, enabled: true };
+/** What the form of a rule that is there holds at first. */
+export const draftOf = ({ name, asset, tag, channel, codes, changes, repeat_s }: Rule): RuleDraft => ({
+  name,
+  asset: asset ?? "*",
+  tag: tag ?? "",
+  channel,
+  codes: codes ?? [],
+  changes: changes ?? [],
+  repeat: repeat_s ?? 0,
+});
+
+/** The rule that the form describes; what the form does not hold is as `before`. */
+export function ruleOf({ repeat, tag, ...settings }: RuleDraft, before?: Rule): NewRule {
+  const { enabled = true, silent_until } = before ?? {};
+  return { ...settings, tag: tag.trim() || null, repeat_s: repeat || null, enabled, silent_until };
 }

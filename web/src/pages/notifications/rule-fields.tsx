@@ -1,5 +1,6 @@
 import type { Channel } from "../../api/alarms";
 import { Choice } from "../../parts/choice";
+import { duration } from "../../words/time";
 import type { RuleDraft } from "./rule-draft";
 
 /** Intervals of reminders, s. */
@@ -9,6 +10,10 @@ const REPEATS = [
   [3600, "Every hour"],
   [86_400, "Every day"],
 ] as const;
+
+/** The intervals, with that of a rule that was made elsewhere. */
+const repeats = (own: number): (readonly [number, string])[] =>
+  REPEATS.some(([s]) => s === own) ? [...REPEATS] : [...REPEATS, [own, `Every ${duration(own)}`]];
 
 interface Props {
   draft: RuleDraft;
@@ -50,7 +55,7 @@ export function RuleFields({ draft, channels, change }: Props) {
       <Choice
         label="Repeated while it fails"
         value={draft.repeat}
-        options={REPEATS}
+        options={repeats(draft.repeat)}
         change={(repeat) => change({ repeat })}
       />
     </div>

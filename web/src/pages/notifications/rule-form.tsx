@@ -1,17 +1,24 @@
 import { useState } from "preact/hooks";
-import { alarmApi, type AlarmChange, type Channel } from "../../api/alarms";
+import { alarmApi, type AlarmChange, type Channel, type Rule } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { ALARM_CODES, alarmCodeTitle, CHANGES } from "../../words/alarm";
 import { CheckGroup } from "./check-group";
-import { firstDraft, ruleOf, type RuleDraft } from "./rule-draft";
+import { draftOf, firstDraft, ruleOf, type RuleDraft } from "./rule-draft";
 import { RuleFields } from "./rule-fields";
 
-export function RuleForm({ channels, made }: { channels: Channel[]; made: () => void }) {
-  const [draft, setDraft] = useState(() => firstDraft(channels[0]?.id ?? ""));
+interface Props {
+  /** The rule that is changed; without one, a rule is made. */
+  rule?: Rule;
+  channels: Channel[];
+  saved: () => void;
+}
+
+export function RuleForm({ rule, channels, saved }: Props) {
+  const [draft, setDraft] = useState(() => (rule ? draftOf(rule) : firstDraft(channels[0]?.id ?? "")));
   const change = (part: Partial<RuleDraft>) => setDraft((before) => ({ ...before, ...part }));
   const save = async () => {
-    await alarmApi.createRule(ruleOf(draft));
-    made();
+    await (rule ? alarmApi.putRule(rule.id, ruleOf(draft, rule)) : alarmApi.createRule(ruleOf(draft)));
+    saved();
   };
   return (
     <>
@@ -32,7 +39,7 @@ export function RuleForm({ channels, made }: { channels: Channel[]; made: () => 
       />
       <div class="form-end">
         <ActionButton class="primary" disabled={!draft.name.trim() || !draft.changes.length} action={save}>
-          Add
+          {rule ? "Save" : "Add"}
         </ActionButton>
       </div>
     </>

@@ -1,8 +1,9 @@
-import { alarmApi, type NewRule, type Rule } from "../../api/alarms";
+import { alarmApi, type Channel, type NewRule, type Rule } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { ConfirmButton } from "../../parts/confirm-button";
 import { alarmCodeTitle, CHANGES } from "../../words/alarm";
 import { dateTime, duration } from "../../words/time";
+import { EditRule } from "./edit-rule";
 
 /** Hours for which a rule is muted by its button. */
 const MUTE_H = 8;
@@ -17,11 +18,12 @@ const isSilent = ({ silent_until }: Rule) => !!silent_until && Date.parse(silent
 
 interface Props {
   rule: Rule;
-  mayChange: boolean;
+  /** None if the caller may not change them. */
+  channels?: Channel[];
   refetch: () => Promise<unknown>;
 }
 
-export function RuleRow({ rule, mayChange, refetch }: Props) {
+export function RuleRow({ rule, channels, refetch }: Props) {
   const codes = rule.codes?.length ? rule.codes.map(alarmCodeTitle).join(", ") : "any fault";
   return (
     <tr>
@@ -39,16 +41,16 @@ export function RuleRow({ rule, mayChange, refetch }: Props) {
       </td>
       <td data-word="by">{rule.channel_name}</td>
       <td data-word="repeated">{rule.repeat_s ? `every ${duration(rule.repeat_s)}` : "–"}</td>
-      {mayChange && (
+      {channels && (
         <td>
-          <RuleActions rule={rule} refetch={refetch} />
+          <RuleActions rule={rule} channels={channels} refetch={refetch} />
         </td>
       )}
     </tr>
   );
 }
 
-function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
+function RuleActions({ rule, channels, refetch }: Required<Props>) {
   const isMuted = isSilent(rule);
   const muteEnd = () => new Date(Date.now() + MUTE_H * 3_600_000).toISOString();
   const change = (more: Partial<NewRule>) => async () => {
@@ -61,6 +63,7 @@ function RuleActions({ rule, refetch }: Omit<Props, "mayChange">) {
   };
   return (
     <>
+      <EditRule rule={rule} channels={channels} refetch={refetch} />{" "}
       <ActionButton class="small" action={change({ enabled: !rule.enabled })}>
         {rule.enabled ? "Turn off" : "Turn on"}
       </ActionButton>{" "}

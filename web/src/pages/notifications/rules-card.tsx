@@ -36,7 +36,7 @@ export function RulesCard({ rules, channels, refetch }: Props) {
             </thead>
             <tbody>
               {rules.map((rule) => (
-                <RuleRow key={rule.id} rule={rule} mayChange={!!channels} refetch={refetch} />
+                <RuleRow key={rule.id} rule={rule} channels={channels} refetch={refetch} />
               ))}
             </tbody>
           </table>
@@ -52,7 +52,7 @@ export function RulesCard({ rules, channels, refetch }: Props) {
       )}
       {isOpen && channels && (
         <Dialog title="Add a rule" close={() => setOpen(false)}>
-          <RuleForm channels={channels} made={made} />
+          <RuleForm channels={channels} saved={made} />
         </Dialog>
       )}
     </section>

@@ -27,9 +27,9 @@ export function FaultReport({ name, code }: { name: string; code: FaultCode }) {
   const error = fault.error ?? asset.error;
   if (!fault.data || !asset.data)
     return <UnloadedPage title={title} what="the fault" kind="fault" error={error} retry={fault.refetch} />;
-  const { kind, freeze_frame, last_occurrence } = fault.data;
+  const { freeze_frame, last_occurrence } = fault.data;
   return (
-    <ReportFrame title={`${faultTitle(code, kind)} of ${name}`} back={faultPath(name, code)}>
+    <ReportFrame title={`${faultTitle(fault.data)} of ${name}`} back={faultPath(name, code)}>
       <FaultSummary fault={fault.data} history={history.data?.items ?? []} />
       <AdviceCard fault={fault.data} />
       <Facts facts={faultFacts(fault.data, true)} />

@@ -66,8 +66,7 @@ function Report({ session, asset, faults }: { session: Session; asset: Asset; fa
         <ol>
           {faults.map((line) => (
             <li>
-              {seconds(line.t_s)}: <b>{faultTitle(line.code, line.kind)}</b> {changeOf(line).text}.{" "}
-              {lineSentence(line)}
+              {seconds(line.t_s)}: <b>{faultTitle(line)}</b> {changeOf(line).text}. {lineSentence(line)}
             </li>
           ))}
         </ol>

@@ -44,7 +44,7 @@ function describe(line: FaultLine) {
   const { text, look } = changeOf(line);
   return (
     <>
-      {faultTitle(line.code, line.kind)} <span class={look}>{text}</span>
+      {faultTitle(line)} <span class={look}>{text}</span>
     </>
   );
 }

@@ -26,8 +26,7 @@ export function FoundFault({ line, seek }: { line: FaultLine; seek?: (t: number)
         <span class="n">{seconds(line.t_s)}</span>
       )}{" "}
       <span>
-        <b>{ambiguousCauses(line.candidates) || faultTitle(line.code, line.kind)}</b>{" "}
-        <span class={look}>{text}</span>
+        <b>{ambiguousCauses(line.candidates) || faultTitle(line)}</b> <span class={look}>{text}</span>
         <br />
         <span class="quiet">{lineSentence(line)}</span>
       </span>

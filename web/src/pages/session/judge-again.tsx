@@ -1,6 +1,8 @@
 import { isFinished } from "../../api/poll";
 import type { Session } from "../../api/types";
 import { useReplay } from "../../hooks/use-replay";
+import { Link } from "../../router/link";
+import { jobsPath } from "../../router/paths";
 import { jobText } from "../../words/job";
 import { ReplayFields } from "./replay-fields";
 import { replaySettings } from "./replay-settings";
@@ -15,7 +17,12 @@ export function JudgeAgain({ session }: { session: Session }) {
       <ReplayFields judge={(form) => judge(replaySettings(form))} />
       {replay && !isFinished(replay) && (
         <p role="status">
-          {jobText(replay, "Judging")} <progress value={replay.progress} max={1} aria-label="Progress" />
+          {replay.waits ? (
+            <Link to={jobsPath()}>{jobText(replay, "Judging")}</Link>
+          ) : (
+            jobText(replay, "Judging")
+          )}{" "}
+          <progress value={replay.progress} max={1} aria-label="Progress" />
         </p>
       )}
       {replay?.error && (

@@ -5,6 +5,7 @@ import { ConfirmButton } from "../../parts/confirm-button";
 import { useRefusal } from "../../parts/login/rights";
 import { Link } from "../../router/link";
 import { rigPath, sessionReportPath, sessionsPath } from "../../router/paths";
+import { AFTER_THE_END } from "../../words/session";
 import { DeleteDialog } from "./delete-dialog";
 import { Download } from "./download";
 
@@ -29,7 +30,7 @@ export function SessionHeader({ session, refetch }: { session: Session; refetch:
           <Download session={session} />
           {state === "open" ? (
             <ConfirmButton word="End session" question="End this session?" action={end} needs="operator">
-              Its verdict becomes final. A rig that goes on sending opens a new session with its next sample.
+              Its verdict becomes final. {AFTER_THE_END}
             </ConfirmButton>
           ) : (
             <button

@@ -7,6 +7,8 @@ import { ActionButton } from "../../parts/action-button";
 import { ErrorMessage } from "../../parts/error-message";
 import { lazy, Suspense } from "../../parts/lazy";
 import { Loading } from "../../parts/loading";
+import { Link } from "../../router/link";
+import { jobsPath } from "../../router/paths";
 import { DropZone } from "./drop-zone";
 import { NoSession, UnknownRig } from "./no-session";
 import { isFiltered } from "./session-filter";
@@ -31,6 +33,9 @@ export function SessionsPage() {
     <main>
       <header class="page-head">
         <h1>Sessions</h1>
+        <div class="page-tools">
+          <Link to={jobsPath()}>Jobs</Link>
+        </div>
       </header>
       <DropZone take={setDropped} />
       {dropped && (

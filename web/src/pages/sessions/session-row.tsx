@@ -30,12 +30,18 @@ export function SessionRow({ session, isChosen, toggle }: Props) {
           result && <span class={result.look}>{result.text}</span>
         )}
       </td>
-      <td class="name">
+      <td class="name" data-word="rig">
         <Link to={rigPath(session.asset)}>{session.asset}</Link>
       </td>
-      <td class="time">{dateTime(session.opened_at)}</td>
-      <td class="n">{duration(sessionLength(session))}</td>
-      <td class="n">{count(session.samples)}</td>
+      <td class="time" data-word="started">
+        {dateTime(session.opened_at)}
+      </td>
+      <td class="n" data-word="length">
+        {duration(sessionLength(session))}
+      </td>
+      <td class="n" data-word="samples">
+        {count(session.samples)}
+      </td>
     </tr>
   );
 }

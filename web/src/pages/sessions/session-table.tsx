@@ -18,7 +18,7 @@ export function SessionTable({ sessions }: { sessions: Session[] }) {
         )}
       </p>
       <div class="scroll">
-        <table class="list">
+        <table class="list alarms">
           <thead>
             <tr>
               <th>

@@ -1,6 +1,7 @@
 import { tagApi } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
 import { Choice } from "../../parts/choice";
+import { Filters } from "../../parts/filters";
 import { TagChoice } from "../../parts/tag-choice";
 import { RigChoice } from "./rig-choice";
 import type { SessionKey } from "./session-filter";
@@ -15,6 +16,9 @@ const SORTS = [
   ["", "Newest first"],
   ["opened_at", "Oldest first"],
 ] as const;
+
+/** The parameters that select or order sessions. */
+const KEYS: SessionKey[] = ["asset", "name", "verdict", "from", "to", "tag", "sort"];
 
 interface Props {
   /** The names of all rigs. */
@@ -48,7 +52,7 @@ function DayField({
 export function SessionTools({ names, word, change }: Props) {
   const { data: tags } = useQuery(tagApi.inUse, "tags");
   return (
-    <div class="form-row">
+    <Filters n={KEYS.filter(word).length}>
       <RigChoice names={names} chosen={word("asset")} change={(name) => change("asset", name)} />
       <label>
         Session
@@ -74,6 +78,6 @@ export function SessionTools({ names, word, change }: Props) {
         value={word("sort")}
         change={(sort) => change("sort", sort)}
       />
-    </div>
+    </Filters>
   );
 }

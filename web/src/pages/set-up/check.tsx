@@ -25,6 +25,7 @@ export function Check({ asset, changed, next }: Props) {
   const { state, buffer, isSending } = useWatchedRig(asset.name);
   const playout = useMemo(() => new PlayoutClock(), []);
   const [signs, setSigns] = useState<Signs>();
+  const [hasEnded, setEnded] = useState(false);
   useEffect(() => {
     const timer = setInterval(() => setSigns(compareSigns(buffer)), COMPARE_MS);
     return () => clearInterval(timer);
@@ -33,7 +34,10 @@ export function Check({ asset, changed, next }: Props) {
   // Earlier samples had other axes, so a new session starts and the comparison is reset.
   const change = async (part: Partial<AssetAxes>) => {
     await api.putAsset({ ...asset, axes: { ...axes, ...part } });
-    if (state?.session_id) await api.endSession(state.session_id);
+    if (state?.session_id) {
+      await api.endSession(state.session_id);
+      setEnded(true);
+    }
     buffer.clear();
     setSigns(undefined);
     await changed();
@@ -44,7 +48,7 @@ export function Check({ asset, changed, next }: Props) {
   };
   return (
     <div class="pair">
-      <LiveCard asset={asset} state={state} isSending={isSending} moment={moment} />
+      <LiveCard asset={asset} state={state} isSending={isSending} hasEnded={hasEnded} moment={moment} />
       <SignsCard axes={axes} signs={signs} evidence={state?.evidence} change={change} next={next} />
     </div>
   );

@@ -4,6 +4,7 @@ import type { Asset, CalibrationJob } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { ActionButton } from "../../parts/action-button";
 import { ErrorMessage } from "../../parts/error-message";
+import { AFTER_THE_END } from "../../words/session";
 import { proposedSessions, totalLength, withChoice } from "./chosen-sessions";
 import { learnFrom } from "./learn-from";
 import { Learnt } from "./learnt";
@@ -49,8 +50,7 @@ export function Learn({ asset, changed }: { asset: Asset; changed: () => Promise
         {chosen.size > 0 && <LengthStatus seconds={totalLength(sessions ?? [], chosen)} />}
         {hasOpen && (
           <p class="note small-text">
-            A chosen session is still being recorded: the calibration ends it. A rig that goes on sending
-            opens a new one.
+            A chosen session is still being recorded: the calibration ends it. {AFTER_THE_END}
           </p>
         )}
         <div class="form-end">

@@ -2,6 +2,7 @@ import type { AssetAxes, Evidence } from "../../api/types";
 import { correctedAxes, type Signs } from "../../live/signs";
 import { ActionButton } from "../../parts/action-button";
 import { seconds } from "../../words/numbers";
+import { AFTER_THE_END } from "../../words/session";
 import { SignList } from "./sign-list";
 import { UnitWarnings } from "./unit-warnings";
 
@@ -48,7 +49,7 @@ export function SignsCard({ axes, signs, evidence, change, next }: Props) {
             Correct the axes
           </ActionButton>{" "}
           <span class="quiet">
-            Changes the axes in the set-up and starts a new session; the device is not changed.
+            Changes the axes in the set-up and ends the session; the device is not changed. {AFTER_THE_END}
           </span>
         </p>
       )}

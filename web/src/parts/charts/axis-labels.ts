@@ -29,3 +29,15 @@ export function valueRange(
   const margin = top > bottom ? (top - bottom) * 0.08 : 1;
   return [bottom - margin, top + margin];
 }
+
+/** Returns the least and greatest value of `lines`; undefined without any. */
+export function extentOf(lines: (number | null)[][]): [number, number] | undefined {
+  let [least, most] = [Infinity, -Infinity];
+  for (const line of lines)
+    for (const value of line) {
+      if (value === null || value === undefined) continue;
+      least = Math.min(least, value);
+      most = Math.max(most, value);
+    }
+  return least <= most ? [least, most] : undefined;
+}

@@ -22,11 +22,27 @@ export class ChartGroup {
   /** What was drawn last; a chart that is added later shows it, too. */
   private drawn?: Drawn;
   private marks: Mark[] = [];
+  /** Charts beside these, with the same scales. */
+  private peer?: ChartGroup;
 
   add(key: string, chart: LineChart, kind: ChartKind, axis: Axis): void {
     this.charts.set(key, { chart, kind, axis });
+    chart.peerExtent = () => this.peer?.extent(key);
     chart.setMarks(this.marksOf(kind, axis));
-    if (this.drawn) this.drawOne({ chart, kind, axis }, this.drawn);
+    if (!this.drawn) return;
+    this.drawOne({ chart, kind, axis }, this.drawn);
+    this.peer?.charts.get(key)?.chart.rescale();
+  }
+
+  /** Gives these charts and those of `peer` the same scales. */
+  share(peer: ChartGroup): void {
+    this.peer = peer;
+    peer.peer = this;
+  }
+
+  /** The least and greatest value of the chart `key`. */
+  private extent(key: string): [number, number] | undefined {
+    return this.charts.get(key)?.chart.extent();
   }
 
   remove(key: string): void {
@@ -48,6 +64,7 @@ export class ChartGroup {
   draw(buffer: TraceBuffer, range: [number, number], playhead: number | null = null): void {
     this.drawn = { buffer, range, playhead };
     this.charts.forEach((one) => this.drawOne(one, this.drawn!));
+    this.peer?.charts.forEach(({ chart }) => chart.rescale());
   }
 
   private drawOne({ chart, kind, axis }: GroupedChart, { buffer, range, playhead }: Drawn): void {

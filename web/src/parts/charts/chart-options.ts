@@ -72,7 +72,7 @@ function axes(digits: number): uPlot.Axis[] {
     {
       ...common,
       size: 46 * scale,
-      space: 26 * scale,
+      space: 17 * scale,
       values: (_, ticks, _axis, _space, step) => value(ticks, step),
     },
   ];
@@ -80,7 +80,11 @@ function axes(digits: number): uPlot.Axis[] {
 
 type BuiltOptions = Omit<uPlot.Options, "width" | "height" | "hooks">;
 
-export function chartOptions(options: LineChartOptions, range: () => [number, number]): BuiltOptions {
+export function chartOptions(
+  options: LineChartOptions,
+  range: () => [number, number],
+  peer: () => [number, number] | undefined,
+): BuiltOptions {
   const { lines, digits = 1, band, sync, minExtent = 0, isPositive = false, onZoom } = options;
   return {
     series: [{ label: "t" }, ...lines.map(series)],
@@ -88,7 +92,17 @@ export function chartOptions(options: LineChartOptions, range: () => [number, nu
     legend: { show: false },
     scales: {
       x: { time: false, range },
-      y: { range: (_, low, high) => valueRange(low, high, minExtent, isPositive) },
+      y: {
+        range: (_, low, high) => {
+          const [least, most] = peer() ?? [Infinity, -Infinity];
+          return valueRange(
+            Math.min(low ?? Infinity, least),
+            Math.max(high ?? -Infinity, most),
+            minExtent,
+            isPositive,
+          );
+        },
+      },
     },
     axes: axes(digits),
     bands: band ? [{ series: [band[0] + 1, band[1] + 1], fill: colour("band") }] : [],

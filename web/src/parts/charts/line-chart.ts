@@ -3,6 +3,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { onTheme } from "../../theme";
 import { chartOptions, type LineChartOptions } from "./chart-options";
+import { extentOf } from "./axis-labels";
 import { drawMarks, drawThresholdLabels, drawThresholds, shadeGates, type Mark } from "./overlays";
 
 /** Movement of a pressed pointer from which on it is a drag and not a click, px. */
@@ -57,6 +58,17 @@ export class LineChart {
     });
   }
 
+  /** The extent of a chart beside this one, with the same scale. */
+  peerExtent: () => [number, number] | undefined = () => undefined;
+
+  /** The least and greatest value of all lines in the shown range; undefined without any. */
+  extent = () => extentOf(this.data.slice(1));
+
+  /** Adopts the scale of what a chart beside this one shows now. */
+  rescale(): void {
+    this.show(this.data, this.range, this.gates, this.playhead);
+  }
+
   setMarks(marks: Mark[]): void {
     this.marks = marks;
     this.plot?.redraw(false);
@@ -73,7 +85,11 @@ export class LineChart {
     this.plot?.destroy();
     const options = {
       ...this.size(),
-      ...chartOptions(this.options, () => this.range),
+      ...chartOptions(
+        this.options,
+        () => this.range,
+        () => this.peerExtent(),
+      ),
       hooks: {
         drawClear: [
           (plot: uPlot) => shadeGates(plot, this.data[0], this.gates),

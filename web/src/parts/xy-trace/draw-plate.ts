@@ -3,7 +3,7 @@ import { colour } from "../../theme";
 import type { PlanView } from "./plan-view";
 import { servoArrows, type ServoArrow } from "./servo-arrows";
 
-/** Draws the outline of the plate, its axes through the centre, and which servo moves the ball which way. */
+/** Draws the outline of the plate, and its axes through the centre. */
 export function drawPlate(view: PlanView, plate: PlateSize): void {
   const { context, scale, toCanvas } = view;
   const { length, width, isRound } = plate;
@@ -17,7 +17,11 @@ export function drawPlate(view: PlanView, plate: PlateSize): void {
   context.fill();
   context.stroke();
   drawAxes(view, length, width);
-  for (const arrow of servoArrows(plate, toCanvas)) drawServo(view, arrow);
+}
+
+/** Draws which servo moves the ball which way, above what is there. */
+export function drawServos(view: PlanView, plate: PlateSize): void {
+  for (const arrow of servoArrows(plate, view.toCanvas)) drawServo(view, arrow);
 }
 
 /** Half of the width of an arrowhead, which is as long as it is wide, px. */
@@ -40,7 +44,13 @@ function drawServo({ context }: PlanView, { from, to, label }: ServoArrow): void
   context.lineTo(x - 2 * HEAD * ux - HEAD * uy, y - 2 * HEAD * uy + HEAD * ux);
   context.fill();
   context.font = "12px system-ui, sans-serif";
-  context.fillText(label, x + 1.5 * HEAD, y + HEAD);
+  const at = [x + 1.5 * HEAD, y + HEAD] as const;
+  // An edge in the colour of the plate, so that the label can be read on the path of the ball.
+  context.lineWidth = 4;
+  context.lineJoin = "round";
+  context.strokeStyle = colour("plate");
+  context.strokeText(label, ...at);
+  context.fillText(label, ...at);
 }
 
 function drawAxes({ context, toCanvas }: PlanView, length: number, width: number): void {

@@ -4,7 +4,7 @@ import type { TraceBuffer } from "../../live/buffer";
 import { ballAt, type PlanePoint } from "../../live/pose";
 import { ballRadius, plateSize } from "../../live/rig-size";
 import { colour } from "../../theme";
-import { drawPlate } from "./draw-plate";
+import { drawPlate, drawServos } from "./draw-plate";
 import { planView, type PlanView } from "./plan-view";
 
 export interface TraceMoment {
@@ -42,6 +42,8 @@ export function drawXyTrace(canvas: HTMLCanvasElement, asset: Asset, moment: Tra
     if (ball) drawBall(view, layer, ball, Math.max(ballRadius(asset) * scale, MIN_RADIUS));
   }
   context.restore();
+  context.setLineDash([]);
+  drawServos(view, plate);
 }
 
 function drawBall({ context, toCanvas }: PlanView, layer: Layer, ball: PlanePoint, radius: number): void {

@@ -1,0 +1,62 @@
+/** Which alarms of the list are shown, in which order, under which headings. */
+import type { Alarm } from "../../api/alarms";
+import { alarmCodeTitle, alarmTitle } from "../../words/alarm";
+import { sinceText } from "../../words/time";
+
+export const ORDERS = {
+  "": "Latest change first",
+  began: "Began last first",
+  oldest: "Began first first",
+  rig: "By rig",
+  fault: "By fault",
+} as const;
+
+export const GROUPS = {
+  "": "None",
+  fault: "Fault",
+  minute: "Minute of the beginning",
+  rig: "Rig",
+} as const;
+
+/** Sorts bench-2 before bench-10. */
+const NAMES = new Intl.Collator("en", { numeric: true });
+
+const began = (alarm: Alarm) => alarm.since ?? "";
+
+const COMPARE: Record<string, (a: Alarm, b: Alarm) => number> = {
+  began: (a, b) => began(b).localeCompare(began(a)),
+  oldest: (a, b) => began(a).localeCompare(began(b)),
+  rig: (a, b) => NAMES.compare(a.asset, b.asset),
+  fault: (a, b) => alarmTitle(a).localeCompare(alarmTitle(b)),
+};
+
+const HEADING: Record<string, (alarm: Alarm) => string> = {
+  fault: ({ code }) => alarmCodeTitle(code),
+  minute: ({ since }) => (since ? `Began ${sinceText(since)}` : "Beginning not known"),
+  rig: ({ asset }) => asset,
+};
+
+export interface AlarmGroup {
+  /** Empty if the alarms are not grouped. */
+  heading: string;
+  alarms: Alarm[];
+}
+
+/** Returns the alarms of the rigs whose names contain `rig`, in an order of `ORDERS`. */
+export function chosenAlarms(alarms: Alarm[], rig: string, order: string): Alarm[] {
+  const part = rig.toLowerCase();
+  const found = alarms.filter(({ asset }) => asset.toLowerCase().includes(part));
+  const compare = COMPARE[order];
+  return compare ? found.sort(compare) : found;
+}
+
+/** Returns the alarms by a grouping of `GROUPS`: the groups in the order of their first alarms. */
+export function grouped(alarms: Alarm[], by: string): AlarmGroup[] {
+  const heading = HEADING[by] ?? (() => "");
+  const groups = new Map<string, Alarm[]>();
+  for (const alarm of alarms) {
+    const title = heading(alarm);
+    groups.set(title, [...(groups.get(title) ?? []), alarm]);
+  }
+  return [...groups].map(([heading, alarms]) => ({ heading, alarms }));
+}
