@@ -2,6 +2,7 @@
 //! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
 //! `restore` and `token`.
 
+mod advertised;
 mod allocator;
 mod buses;
 mod connections;
@@ -328,6 +329,7 @@ impl NodeListener {
             .await
             .with_context(|| format!("`cluster.listen`: cannot listen on {}", cluster.listen))?;
         let identity = cluster.identity(listener.local_addr()?);
+        advertised::check(&listener, &identity.address).await?;
         Ok(Self { listener, identity, partitions: cluster.partitions() })
     }
 }
