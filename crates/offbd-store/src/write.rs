@@ -187,7 +187,7 @@ impl Writer {
             }
             Err(error) => {
                 self.tails.forget_uncommitted();
-                self.note_unexpected(error);
+                self.note_replaced(error);
                 match error {
                     // The transaction was rolled back, and the connection holds locks.
                     StoreError::Overtaken { partitions } => self.lose(partitions),
@@ -247,7 +247,7 @@ impl Writer {
             return Err(StoreError::UnexpectedCommits { expected, found });
         }
         let connected = self.connect_again().await;
-        connected.inspect_err(|error| self.note_unexpected(error))
+        connected.inspect_err(|error| self.note_replaced(error))
     }
 
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
@@ -261,10 +261,11 @@ impl Writer {
         attempt.await.unwrap_or_else(late)
     }
 
-    fn note_unexpected(&mut self, error: &StoreError) {
-        let StoreError::UnexpectedCommits { expected, found } = error else { return };
-        self.unexpected = Some((*expected, *found));
-        if self.role == WriterRole::Node {
+    fn note_replaced(&mut self, error: &StoreError) {
+        if let StoreError::UnexpectedCommits { expected, found } = error {
+            self.unexpected = Some((*expected, *found));
+        }
+        if error.is_replaced() && self.role == WriterRole::Node {
             let all: Vec<_> = self.owned().into_iter().map(|(partition, _)| partition).collect();
             self.lose(&all);
         }

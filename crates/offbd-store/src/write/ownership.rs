@@ -332,6 +332,12 @@ impl Writer {
         Ok(())
     }
 
+    /// Whether this is the writer of a node of a cluster.
+    #[must_use]
+    pub fn is_node(&self) -> bool {
+        self.role == WriterRole::Node
+    }
+
     /// The partitions that were lost since the last call: others have taken them.
     pub fn lost(&mut self) -> Vec<PartitionId> {
         std::mem::take(&mut self.owned.lost)
