@@ -4,6 +4,8 @@
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod bus;
 mod clients;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod clocks;
 mod history;
 mod kills;
 mod link_figures;

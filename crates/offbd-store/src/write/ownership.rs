@@ -459,7 +459,9 @@ impl Writer {
             return Err(sqlx::Error::PoolClosed.into());
         };
         let nodes = sqlx::query_as(concat!(
-            "SELECT id, name, address, version, leaving FROM node WHERE ",
+            "SELECT id, name, address, version, leaving,
+             CAST(EXTRACT(EPOCH FROM clock_timestamp()) * 1000000 AS BIGINT) AS read_at
+             FROM node WHERE ",
             is_alive!(),
             " ORDER BY id"
         ));
