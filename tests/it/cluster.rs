@@ -6,6 +6,7 @@ mod bus;
 mod clients;
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 mod clocks;
+mod events;
 mod history;
 mod kills;
 mod link_figures;

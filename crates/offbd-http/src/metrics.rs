@@ -106,6 +106,8 @@ metrics! {
         At(0.0, &[CHANNEL, ("result", || vec!["delivered", "failed"])])
         => "Attempts to deliver, by channel and result";
     "offbd_engines" Gauge Later => "Engines in memory, by shard";
+    "offbd_event_reads_total" Counter ZERO
+        => "Reads of the events of all nodes, while somebody listens";
     "offbd_fault_changes_total" Counter
         At(0.0, &[
             ("code", || each(FaultCode::ALL, FaultCode::as_str)),

@@ -36,7 +36,7 @@ use super::checkpoint::{self, Checkpointer};
 use super::journal::{Journal, JournalChanges};
 use super::tail::Tails;
 use super::writer_lock::{Backend, WriterRole};
-use super::{EVENTS, Location, MIGRATIONS, NodeIdentity, PartitionId, Partitions, StoreError};
+use super::{Location, MIGRATIONS, NodeIdentity, PartitionId, Partitions, StoreError};
 
 /// Longest duration of a commit; then its connection is dropped. A disk that is slower
 /// cannot support the service.
@@ -380,10 +380,7 @@ impl Writer {
             group.relocate(&mut transaction, relocation).await?;
         }
         group.flush(&mut transaction).await?;
-        let (journal, has_events) = (group.changes, group.events.is_used());
-        if has_events && self.role == WriterRole::Node {
-            ownership::notify(&mut transaction, EVENTS).await?;
-        }
+        let journal = group.changes;
         if !partitions.is_empty() {
             self.owned.fence(&mut transaction, &partitions, self.node.as_ref()).await?;
             self.in_doubt = Some(InDoubt { partitions, journal });

@@ -106,6 +106,7 @@ pub(crate) fn spawn(task: NodeTask, service: &Service) -> Vec<JoinHandle<()>> {
     vec![
         tokio::spawn(listen::run(handles.clone(), task.cluster.clone(), events.clone())),
         tokio::spawn(events.clone().read_all(closing.clone())),
+        tokio::spawn(events.clone().announce_all(closing.clone())),
         tokio::spawn(resume_taken(Arc::downgrade(&service.inner), taken, closing)),
         tokio::spawn(task.run(resume)),
     ]
