@@ -9,6 +9,7 @@ mod connections;
 mod delivery;
 mod keys;
 mod listen;
+mod room;
 mod tls;
 pub mod tokens;
 #[cfg_attr(not(feature = "otel"), path = "server/no_traces.rs")]
@@ -114,7 +115,8 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         Some(cluster) => Some(NodeListener::bind(cluster).await?),
         None => None,
     };
-    let (store, writer) = open(&location, node.as_ref()).await?;
+    let open = async || open(&location, node.as_ref()).await;
+    let (store, writer) = room::opened(lock.as_ref(), open).await?;
     let listener = TcpListener::bind(config.listen).await.with_context(|| {
         format!(
             "`listen`: cannot listen on {} (`--listen` chooses another address, port 0 a free one)",
