@@ -2,12 +2,14 @@
 //! graceful stop. Also the functions behind the commands `migrate`, `check`, `backup`,
 //! `restore` and `token`.
 
+mod advertised;
 mod allocator;
 mod buses;
 mod connections;
 mod delivery;
 mod keys;
 mod listen;
+mod room;
 mod tls;
 pub mod tokens;
 #[cfg_attr(not(feature = "otel"), path = "server/no_traces.rs")]
@@ -113,7 +115,8 @@ pub async fn start_with(config: Config, demo: Option<ExtraRoutes>) -> Result<Ser
         Some(cluster) => Some(NodeListener::bind(cluster).await?),
         None => None,
     };
-    let (store, writer) = open(&location, node.as_ref()).await?;
+    let open = async || open(&location, node.as_ref()).await;
+    let (store, writer) = room::opened(lock.as_ref(), open).await?;
     let listener = TcpListener::bind(config.listen).await.with_context(|| {
         format!(
             "`listen`: cannot listen on {} (`--listen` chooses another address, port 0 a free one)",
@@ -328,6 +331,7 @@ impl NodeListener {
             .await
             .with_context(|| format!("`cluster.listen`: cannot listen on {}", cluster.listen))?;
         let identity = cluster.identity(listener.local_addr()?);
+        advertised::check(&listener, &identity.address).await?;
         Ok(Self { listener, identity, partitions: cluster.partitions() })
     }
 }

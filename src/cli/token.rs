@@ -34,6 +34,8 @@ enum TokenCommand {
     Create(CreateArgs),
     List(ListArgs),
     Revoke(RevokeArgs),
+    #[cfg(feature = "nats")]
+    NatsIssuer(NatsIssuerArgs),
 }
 
 /// Creates a token and prints it. It is stored as a hash only, so it cannot be shown again.
@@ -74,6 +76,18 @@ struct RevokeArgs {
     config: ConfigArgs,
 }
 
+/// Makes the key with which offbd tells a NATS server the rights of devices.
+///
+/// Writes the seed, for `nats.issuer_seed`, to a new file that only its owner may
+/// read, and prints the public key, for `auth_callout` of the NATS server.
+#[cfg(feature = "nats")]
+#[derive(Clone, Debug, Args)]
+struct NatsIssuerArgs {
+    /// File for the seed
+    #[arg(value_name = "FILE")]
+    seed: std::path::PathBuf,
+}
+
 pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
     match &args.command {
         TokenCommand::Create(args) => offbd_terminal::block_on(create(args)),
@@ -81,7 +95,22 @@ pub(super) fn run(args: &TokenArgs) -> anyhow::Result<()> {
         TokenCommand::Revoke(args) => {
             offbd_terminal::block_on(tokens::revoke_token(&args.config.load()?, &args.token))
         }
+        #[cfg(feature = "nats")]
+        TokenCommand::NatsIssuer(args) => make_nats_issuer(&args.seed),
     }
+}
+
+#[cfg(feature = "nats")]
+fn make_nats_issuer(path: &std::path::Path) -> anyhow::Result<()> {
+    use anyhow::Context;
+    let pair = nkeys::KeyPair::new_account();
+    let mut options = std::fs::OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options.open(path).with_context(|| format!("cannot create {}", path.display()));
+    writeln!(file?, "{}", pair.seed()?)?;
+    output::print_line(&pair.public_key())
 }
 
 async fn create(args: &CreateArgs) -> anyhow::Result<()> {

@@ -4,6 +4,9 @@
 #[cfg(all(feature = "nats", feature = "mqtt"))]
 mod bus;
 mod clients;
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod clocks;
+mod events;
 mod history;
 mod kills;
 mod link_figures;
@@ -272,6 +275,9 @@ async fn what_does_not_belong_to_the_cluster_is_refused() {
     assert!(log.contains("`cluster.name` must be 1 to 64 letters"), "{log}");
     let log = refusal(&[("OFFBD_CLUSTER__LISTEN", "0.0.0.0:0")]);
     assert!(log.contains("`cluster.advertise` is missing"), "{log}");
+    let other = cluster.client(0).get("cluster").await.expect(200)["nodes"][0]["address"].clone();
+    let log = refusal(&[("OFFBD_CLUSTER__ADVERTISE", other.as_str().unwrap())]);
+    assert!(log.contains("does not lead to this node: nothing arrives here"), "{log}");
     // A process that works alone would not know of the partitions' owners.
     let url = cluster.url();
     // On a busy machine the attempt to connect may time out before the wait for the lock does.

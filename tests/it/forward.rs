@@ -1,6 +1,7 @@
 //! The edge agent `offbd forward`, as a process, between a device and the real service.
 
 mod answers;
+mod damage;
 #[cfg(target_os = "linux")]
 mod failing_disk;
 #[cfg(unix)]

@@ -342,6 +342,47 @@ async fn a_full_or_failing_disk_loses_nothing() {
     load.stop().await;
 }
 
+/// What the store has on the disk, bytes.
+#[cfg(target_os = "linux")]
+fn used(data: &Path) -> u64 {
+    let files = std::fs::read_dir(data).unwrap().map(Result::unwrap);
+    let of_store =
+        files.filter(|file| file.file_name().to_str().unwrap().starts_with("offbd.sqlite"));
+    of_store.map(|file| file.metadata().unwrap().len()).sum()
+}
+
+#[cfg(target_os = "linux")]
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_service_that_is_killed_on_a_full_disk_is_read_after_the_next_start() {
+    let data = tempfile::tempdir().unwrap();
+    let system = FaultySystem::new(data.path());
+    let mut process = Process::start_with(data.path(), &system.environment());
+    process.client.asset("a").await;
+    let samples = rig(42_000, usize::MAX);
+    // The log is longer than what the store has.
+    for part in samples[..40_000].chunks(10_000) {
+        process.client.telemetry("a", Some("s"), part).await;
+    }
+    for _ in 0..2 {
+        system.set(&format!("room {}", used(data.path())));
+        // The disk is full by then; the rest of the log takes a part of it.
+        send(&process.client, &samples[40_000..]);
+        process.client.readiness(503).await;
+        drop(process);
+        // Others take what it has not kept.
+        let index = data.path().join("offbd.sqlite-shm");
+        std::fs::remove_file(index).unwrap();
+        system.set(&format!("room {}", used(data.path())));
+        process = Process::start_with(data.path(), &system.environment());
+        let stored = process.client.recording("a", "s").await;
+        assert!(stored.len() >= 40_000 && stored == samples[..stored.len()], "{}", stored.len());
+    }
+    system.clear();
+    process.client.readiness(200).await;
+    process.client.telemetry("a", Some("s"), &samples[40_000..]).await;
+    assert!(process.client.recording("a", "s").await == samples);
+}
+
 #[cfg(target_os = "linux")]
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_step_of_the_wall_clock_loses_nothing() {

@@ -5,8 +5,8 @@ use std::fs::{DirBuilder, OpenOptions};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What SQLite and the reserve add to the name of the spool.
-const ENDINGS: [&str; 4] = ["", "-wal", "-shm", "-reserve"];
+/// What the reserve, and spools of version 0.1, add to the name of the spool.
+const ENDINGS: [&str; 4] = ["", "-reserve", "-wal", "-shm"];
 
 /// Options that create a file for its owner only.
 pub(super) fn private() -> OpenOptions {
@@ -24,7 +24,7 @@ pub(super) fn with_ending(path: &Path, ending: &str) -> PathBuf {
 }
 
 /// Creates the spool at `path` with its folder if they are missing, for their owner only, and takes
-/// the files from others if they can read them. SQLite gives its other files the same permissions.
+/// the files from others if they can read them.
 pub(super) fn prepare(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         let mut builder = DirBuilder::new();

@@ -4,17 +4,19 @@
 //! What the agent has acknowledged is on its disk. It is sent in order for each asset, and again
 //! until the service says that it is stored; as the service recognises a sample that comes again,
 //! nothing is lost or counted twice. When the spool is full the agent takes no more. A batch that
-//! the service refuses for good, and samples that it rejects, stay in the spool, with the reason,
-//! until a person sends them again or deletes them.
+//! the service refuses for good, samples that it rejects, and batches that the disk has damaged
+//! stay in the spool, with the reason, until a person sends them again or deletes them.
 
 mod answer;
 pub mod command;
+mod database;
 mod delays;
 mod delivery;
 mod files;
 mod intake;
 mod lines;
 mod listen;
+mod log;
 mod refusal;
 mod reserve;
 mod source;

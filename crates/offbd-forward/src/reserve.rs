@@ -1,4 +1,4 @@
-//! Space that is kept on the disk, because SQLite needs some to delete.
+//! Space that is kept on the disk for what must be written when it is full.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -6,17 +6,16 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// Size of the reserve, bytes. Chosen: the log of a spool has up to 4 MiB of pages that are not in
-/// the database yet, and a batch of 4 MiB more; when they get there, and when such a batch is set
-/// aside, either grows by that.
+/// Size of the reserve, bytes. Chosen: a batch of 4 MiB is written again when it is set aside, and
+/// after a stop signal what was read of a pipe.
 pub(super) const RESERVE_BYTES: u64 = 16 << 20;
 
 /// Pause before the reserve is filled again. Chosen: a disk that has just been full may need room
 /// for others first.
 const PAUSE: Duration = Duration::from_secs(30);
 
-/// A file of [`RESERVE_BYTES`] beside the spool, which is deleted when a full disk prevents a
-/// deletion.
+/// A file of [`RESERVE_BYTES`] beside the spool, which is deleted when a full disk prevents
+/// that a batch is set aside.
 #[derive(Debug)]
 pub(super) struct Reserve {
     path: PathBuf,
@@ -41,10 +40,8 @@ impl Reserve {
     }
 
     /// Fills the file, or deletes it if the disk has no room for it.
-    pub(super) async fn keep(&mut self) -> io::Result<()> {
-        let path = self.path.clone();
-        let filled = tokio::task::spawn_blocking(move || fill(&path)).await;
-        let filled = filled.unwrap_or_else(|panicked| Err(io::Error::other(panicked)));
+    pub(super) fn keep(&mut self) -> io::Result<()> {
+        let filled = fill(&self.path);
         (self.is_kept, self.since) = (filled.is_ok(), now());
         if filled.is_err() {
             // Not to be in the way of others. May not be there at all.

@@ -106,6 +106,8 @@ metrics! {
         At(0.0, &[CHANNEL, ("result", || vec!["delivered", "failed"])])
         => "Attempts to deliver, by channel and result";
     "offbd_engines" Gauge Later => "Engines in memory, by shard";
+    "offbd_event_reads_total" Counter ZERO
+        => "Reads of the events of all nodes, while somebody listens";
     "offbd_fault_changes_total" Counter
         At(0.0, &[
             ("code", || each(FaultCode::ALL, FaultCode::as_str)),
@@ -116,6 +118,8 @@ metrics! {
     "offbd_http_requests_total" Counter Later => "Requests, by path and status";
     "offbd_ingest_stalled" Gauge ZERO => "1 if batches wait and nothing is committed";
     "offbd_journal_bytes" Gauge ZERO => "Bytes in the journal, not yet folded into the recordings";
+    "offbd_node_clock_offset_seconds" Gauge ZERO
+        => "Clock of this node ahead of that of the database, beyond the time of a look";
     "offbd_partitions_handed_over_total" Counter ZERO
         => "Partitions given to other nodes as planned";
     "offbd_partitions_lost_total" Counter ZERO => "Partitions that other nodes have taken";

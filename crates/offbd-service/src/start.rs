@@ -300,6 +300,7 @@ impl Service {
             transfers,
             shards: queues.clone(),
             lost,
+            clock: Reasons::default(),
         });
         let communication = CommunicationWatch::new(
             handles.clone(),

@@ -237,6 +237,13 @@ impl StoreError {
             && (self.is_full() || !self.is_outage())
     }
 
+    /// Returns whether another process is in the place of this one, or the database in the place
+    /// of another one: what this node of a cluster owned is not its own any more.
+    #[must_use]
+    pub const fn is_replaced(&self) -> bool {
+        matches!(self, Self::UnexpectedCommits { .. } | Self::NameInUse { .. })
+    }
+
     /// The error of a query that takes too long.
     #[must_use]
     pub fn too_slow() -> Self {

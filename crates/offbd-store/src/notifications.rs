@@ -32,6 +32,16 @@ impl Notifications {
 }
 
 impl Store {
+    /// Tells the other nodes of a cluster that there are events. Not in the transaction that has
+    /// them: such commits would wait for one another, over all databases of the server.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the database is unavailable.
+    pub async fn announce_events(&self) -> Result<(), StoreError> {
+        sqlx::query("SELECT pg_notify($1, '')").bind(EVENTS).execute(&self.pool).await?;
+        Ok(())
+    }
+
     /// Subscribes to the notifications of a PostgreSQL database; `None` for SQLite.
     ///
     /// # Errors

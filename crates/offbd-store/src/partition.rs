@@ -1,6 +1,7 @@
 //! Partitions: every asset belongs to one, by a hash of its name. Each partition has one
 //! owner at a time, and numbers its transactions for itself.
 
+use super::Micros;
 use super::from_row::from_row;
 
 /// Bits of a journal row's id for the number of the commit; those above are the partition.
@@ -149,9 +150,11 @@ pub struct NodeRow {
     pub version: String,
     /// 1 once it hands its partitions over.
     pub leaving: i64,
+    /// The time of the database server when this was read.
+    pub read_at: Micros,
 }
 
-from_row!(NodeRow { id, name, address, version, leaving });
+from_row!(NodeRow { id, name, address, version, leaving, read_at });
 
 #[cfg(test)]
 mod tests {

@@ -36,7 +36,7 @@ use super::checkpoint::{self, Checkpointer};
 use super::journal::{Journal, JournalChanges};
 use super::tail::Tails;
 use super::writer_lock::{Backend, WriterRole};
-use super::{EVENTS, Location, MIGRATIONS, NodeIdentity, PartitionId, Partitions, StoreError};
+use super::{Location, MIGRATIONS, NodeIdentity, PartitionId, Partitions, StoreError};
 
 /// Longest duration of a commit; then its connection is dropped. A disk that is slower
 /// cannot support the service.
@@ -187,7 +187,7 @@ impl Writer {
             }
             Err(error) => {
                 self.tails.forget_uncommitted();
-                self.note_unexpected(error);
+                self.note_replaced(error);
                 match error {
                     // The transaction was rolled back, and the connection holds locks.
                     StoreError::Overtaken { partitions } => self.lose(partitions),
@@ -247,7 +247,7 @@ impl Writer {
             return Err(StoreError::UnexpectedCommits { expected, found });
         }
         let connected = self.connect_again().await;
-        connected.inspect_err(|error| self.note_unexpected(error))
+        connected.inspect_err(|error| self.note_replaced(error))
     }
 
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
@@ -261,10 +261,11 @@ impl Writer {
         attempt.await.unwrap_or_else(late)
     }
 
-    fn note_unexpected(&mut self, error: &StoreError) {
-        let StoreError::UnexpectedCommits { expected, found } = error else { return };
-        self.unexpected = Some((*expected, *found));
-        if self.role == WriterRole::Node {
+    fn note_replaced(&mut self, error: &StoreError) {
+        if let StoreError::UnexpectedCommits { expected, found } = error {
+            self.unexpected = Some((*expected, *found));
+        }
+        if error.is_replaced() && self.role == WriterRole::Node {
             let all: Vec<_> = self.owned().into_iter().map(|(partition, _)| partition).collect();
             self.lose(&all);
         }
@@ -379,10 +380,7 @@ impl Writer {
             group.relocate(&mut transaction, relocation).await?;
         }
         group.flush(&mut transaction).await?;
-        let (journal, has_events) = (group.changes, group.events.is_used());
-        if has_events && self.role == WriterRole::Node {
-            ownership::notify(&mut transaction, EVENTS).await?;
-        }
+        let journal = group.changes;
         if !partitions.is_empty() {
             self.owned.fence(&mut transaction, &partitions, self.node.as_ref()).await?;
             self.in_doubt = Some(InDoubt { partitions, journal });

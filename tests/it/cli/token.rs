@@ -35,6 +35,26 @@ fn a_token_can_be_created_listed_and_revoked() {
     assert!(!table.contains(&secret[6..]) && !tokens[1].to_string().contains(&secret[6..]));
 }
 
+#[cfg(feature = "nats")]
+#[test]
+fn the_key_for_a_nats_server_is_made_once() {
+    let cli = CliFixture::new();
+    let public = cli.ok("token nats-issuer issuer.seed").stdout;
+    let seed = std::fs::read_to_string(cli.path("issuer.seed")).unwrap();
+    let pair = nkeys::KeyPair::from_seed(seed.trim()).unwrap();
+    assert_eq!(public.trim(), pair.public_key());
+    assert!(public.starts_with('A') && seed.starts_with("SA"), "{public}");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let metadata = cli.path("issuer.seed").metadata().unwrap();
+        assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
+    }
+    let refused = cli.run(1, "token nats-issuer issuer.seed").stderr;
+    assert!(refused.contains("issuer.seed"), "{refused}");
+    assert_eq!(std::fs::read_to_string(cli.path("issuer.seed")).unwrap(), seed);
+}
+
 #[test]
 fn invalid_token_options_are_rejected() {
     let cli = CliFixture::new();

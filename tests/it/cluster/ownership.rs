@@ -7,11 +7,11 @@ use offbd::store::{
 use offbd_core::vocabulary::Sample;
 use sqlx::Executor;
 
-use super::not_ready;
+use super::{not_ready, register_rigs};
 use crate::support::cluster::Cluster;
 use crate::support::postgres::Postgres;
 use crate::support::process::Refusal;
-use crate::support::{DEADLINE, connection};
+use crate::support::{DEADLINE, batch, connection, rig};
 
 const N: u32 = 64;
 
@@ -167,10 +167,24 @@ async fn a_node_that_is_paused_has_its_name_again_once_the_other_one_is_gone() {
     let cluster = Cluster::start().await;
     let Err(Refusal { log, .. }) = cluster.try_node(1, &[]) else { panic!("two with one name") };
     assert!(log.contains("another node of the cluster has the name `node-1`"), "{log}");
+    let names = register_rigs(&cluster).await;
+    let owned = cluster.owned_by(1, &names).await;
     cluster.signal(1, "-STOP");
     let second = cluster.try_node(1, &[]).unwrap_or_else(|Refusal { log, .. }| panic!("{log}"));
-    cluster.signal(1, "-CONT");
-    not_ready(&cluster.client(1), "has the name `node-1`").await;
+    // What it has received while it was paused it refuses as well.
+    let samples = batch(Some("s"), &rig(10, usize::MAX));
+    let path = format!("assets/{}/telemetry", owned[0]);
+    let client = cluster.client(1);
+    let early = client.post(&path, &samples);
+    let awake = async {
+        cluster.signal(1, "-CONT");
+        not_ready(&client, "has the name `node-1`").await;
+    };
+    let (early, ()) = tokio::time::timeout(DEADLINE, async { tokio::join!(early, awake) })
+        .await
+        .expect("the batch is answered");
+    assert_eq!(early.problem(503)["type"], "urn:offbd:problem:moving");
+    client.post(&path, &samples).await.problem(503);
     second.client.readiness(200).await;
     drop(second);
     cluster.client(1).readiness(200).await;

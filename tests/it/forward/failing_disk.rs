@@ -48,20 +48,41 @@ async fn a_spool_on_a_full_disk_is_emptied_and_then_takes_batches_again() {
     fixture.client.asset("a").await;
     let proxy = LyingProxy::start(&fixture.client.address).await;
     let agent = Agent::start_with(&spool, &proxy.url, &[], &system.environment());
-    agent.drained().await;
-    assert!(agent.has_logged("the disk is full; the agent takes nothing until it has room again"));
+    let status = agent.drained().await;
     assert_eq!(fixture.client.recording("a", "s").await, samples[..n_taken]);
-    // The room of what was deleted is enough.
-    let status = eventually(|| async {
-        let status = agent.status().await;
-        (status["reserve_bytes"] != 0).then_some(status)
-    })
-    .await;
     assert_eq!((&status["used_bytes"], &status["refused"]), (&json!(0), &json!([])));
+    // The room of what was deleted is enough.
     let next = &samples[n_taken..n_taken + N];
     agent.client.telemetry("a", Some("t"), next).await;
     agent.drained().await;
     assert_eq!(fixture.client.recording("a", "t").await, next);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_refused_while_the_disk_is_full_is_set_aside() {
+    const N_BATCHES: usize = 3;
+    let directory = tempfile::tempdir().unwrap();
+    let spool = directory.path().join("offbd.sqlite");
+    let system = FaultySystem::new(directory.path());
+    let agent = Agent::start_with(&spool, &nowhere(), &[], &system.environment());
+    let samples = rig(N_BATCHES * N, usize::MAX);
+    for part in samples.chunks(N) {
+        agent.client.telemetry("a", Some("s"), part).await;
+    }
+    drop(agent);
+    system.set(&format!("room {}", used(directory.path())));
+    let fixture = ServiceFixture::start().await;
+    let proxy = LyingProxy::start(&fixture.client.address).await;
+    let refusal = json!({ "type": "urn:offbd:problem:malformed", "title": "Malformed body",
+        "status": 400, "detail": "of no use" });
+    proxy.tell(Some((400, "application/problem+json", refusal.to_string())));
+    let agent = Agent::start_with(&spool, &proxy.url, &[], &system.environment());
+    let status = agent.drained().await;
+    assert_eq!(status["refused"].as_array().unwrap().len(), N_BATCHES, "{status}");
+    assert!(agent.has_logged("the disk is full; the agent takes nothing until it has room again"));
+    assert_eq!(status["reserve_bytes"], 0);
+    let refused = agent.client.post("assets/a/telemetry", &batch(Some("s"), &samples[..1])).await;
+    assert!(refused.problem(503)["detail"].as_str().unwrap().contains("full"));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -83,7 +104,7 @@ async fn a_spool_that_fails_is_tried_again() {
     eventually(|| async {
         let status = agent.status().await;
         let reason = status["held_up"][0]["reason"].as_str().unwrap_or_default().to_owned();
-        reason.contains("I/O error").then_some(())
+        reason.contains("os error 5").then_some(())
     })
     .await;
     system.clear();

@@ -41,7 +41,7 @@ pub(super) struct ListRefusedArgs {
 ///
 /// Stop the agent first: devices keep what it does not acknowledge. Samples go to
 /// the session that they were meant for; if it is a new one, it ends the session
-/// that is open.
+/// that is open. A damaged batch cannot be sent; --all leaves it where it is.
 #[derive(Clone, Debug, Args)]
 pub(super) struct SendAgainArgs {
     #[command(flatten)]
@@ -74,11 +74,15 @@ impl RefusedCommand {
         match self {
             Self::List(args) => list(&args.spool.open().await?.refused().await?, args.format),
             Self::SendAgain(SendAgainArgs { chosen }) => {
-                let (spool, ids) = chosen.open().await?;
+                let spool = chosen.spool.open().await?;
+                let ids = if chosen.all { spool.sendable().await? } else { chosen.ids.clone() };
                 spool.send_again(&ids).await.map_err(unknown_id)
             }
             Self::Remove(RemoveArgs { chosen }) => {
-                let (spool, ids) = chosen.open().await?;
+                let spool = chosen.spool.open().await?;
+                let refused = spool.refused().await?;
+                let all = || refused.iter().map(|batch| batch.id).collect();
+                let ids = if chosen.all { all() } else { chosen.ids.clone() };
                 spool.delete(&ids).await.map_err(unknown_id)
             }
         }
@@ -98,20 +102,11 @@ impl SpoolArgs {
     }
 }
 
-impl ChosenArgs {
-    async fn open(&self) -> anyhow::Result<(Spool, Vec<i64>)> {
-        let spool = self.spool.open().await?;
-        let ids = match self.all {
-            true => spool.refused().await?.iter().map(|batch| batch.id).collect(),
-            false => self.ids.clone(),
-        };
-        Ok((spool, ids))
-    }
-}
-
 fn unknown_id(error: SpoolError) -> anyhow::Error {
     match error {
-        SpoolError::NotSetAside(_) => BadArgument(error.to_string()).into(),
+        SpoolError::NotSetAside(_) | SpoolError::Damaged(_) => {
+            BadArgument(error.to_string()).into()
+        }
         error => error.into(),
     }
 }

@@ -24,7 +24,7 @@ use super::ownership::Ownership;
 use super::start::Inner;
 use super::writing::{Handles, TransferRequest, Transfers};
 use super::{Reasons, Service, ServiceError};
-use offbd_store::{NodeIdentity, NodeRow, PartitionId, PartitionRow};
+use offbd_store::{Micros, NodeIdentity, NodeRow, PartitionId, PartitionRow};
 use offbd_wire::cluster::{ClusterView, NodeView, PlaceView};
 
 /// How often a node looks at the partitions. A quarter of the time after which the server
@@ -37,6 +37,10 @@ const CONFIRM_TIMEOUT: Duration = Duration::from_secs(3);
 /// Longest time for handing all partitions over at a stop. Chosen: less than
 /// `limits.shutdown_s`.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Difference of the clocks of a node and of the database that is logged, µs. Chosen: what the
+/// manual asks for.
+const WRONG_CLOCK: Micros = 1_000_000;
 
 /// Take-overs whose work waits to be continued. If there are more, the jobs of a partition
 /// stay queued until its next owner.
@@ -78,6 +82,20 @@ pub(crate) struct NodeTask {
     pub(crate) shards: Shards,
     /// Partitions that other nodes have taken.
     pub(crate) lost: mpsc::Receiver<PartitionId>,
+    /// Whether it is logged that the clock is wrong.
+    pub(crate) clock: Reasons,
+}
+
+/// By how much a clock that said `before` and `after` is ahead of one that said `read_at` between
+/// the two. 0 if that may be so with equal clocks, however long the answer has taken.
+const fn clock_offset(read_at: Micros, before: Micros, after: Micros) -> Micros {
+    if read_at < before {
+        before - read_at
+    } else if read_at > after {
+        after - read_at
+    } else {
+        0
+    }
 }
 
 /// Starts the tasks of a node on the current runtime.
@@ -88,6 +106,7 @@ pub(crate) fn spawn(task: NodeTask, service: &Service) -> Vec<JoinHandle<()>> {
     vec![
         tokio::spawn(listen::run(handles.clone(), task.cluster.clone(), events.clone())),
         tokio::spawn(events.clone().read_all(closing.clone())),
+        tokio::spawn(events.clone().announce_all(closing.clone())),
         tokio::spawn(resume_taken(Arc::downgrade(&service.inner), taken, closing)),
         tokio::spawn(task.run(resume)),
     ]
@@ -159,9 +178,24 @@ impl NodeTask {
     /// Reads who owns what.
     async fn observe(&self) -> Result<(Vec<NodeRow>, Vec<PartitionRow>), ServiceError> {
         let look = Look::begin(&self.handles.ownership);
+        let before = self.handles.clock.now();
         let (nodes, partitions) = self.transfers.call(TransferRequest::Observe).await?;
+        self.compare_clocks(&nodes, before);
         self.cluster.routes.set(look, &nodes, &partitions);
         Ok((nodes, partitions))
+    }
+
+    /// Compares the clock of this node with that of the database, which was read after `before`.
+    fn compare_clocks(&self, nodes: &[NodeRow], before: Micros) {
+        let Some(read_at) = nodes.first().map(|node| node.read_at) else { return };
+        let offset = clock_offset(read_at, before, self.handles.clock.now());
+        metrics::gauge!("offbd_node_clock_offset_seconds").set(offset as f64 / 1e6);
+        if offset.abs() < WRONG_CLOCK {
+            self.clock.clear();
+        } else if self.clock.is_new(&"wrong") {
+            let offset_s = offset / 1_000_000;
+            tracing::warn!(offset_s, "the clock of this node is not that of the database");
+        }
     }
 
     async fn look(

@@ -28,8 +28,8 @@ use std::future::Future;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use tokio::sync::Notify;
 use tokio::sync::broadcast::error::RecvError;
+use tokio::sync::{Notify, broadcast};
 
 pub(super) use planner::{delivery, test_message};
 pub use retry::NotificationSettings;
@@ -38,7 +38,7 @@ pub use targets::TargetPolicy;
 
 use super::mutes::Mutes;
 use super::writing::{Events, Handles};
-use super::{Reasons, ServiceError, views};
+use super::{Event, Reasons, ServiceError, views};
 use offbd_store::ChannelRow;
 use offbd_wire::notification::{NotificationView, StoredChannel};
 
@@ -119,7 +119,7 @@ impl<T: NotificationTransport> Notifier<T> {
     }
 
     async fn run_forever(self) {
-        let mut events = self.events.subscribe();
+        let mut events = None;
         let mut ticks = tokio::time::interval(INTERVAL);
         ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         let reasons = Reasons::default();
@@ -127,28 +127,41 @@ impl<T: NotificationTransport> Notifier<T> {
             tokio::select! {
                 _ = ticks.tick() => {}
                 () = self.wake.notified() => {}
-                received = events.recv() => match received {
-                    Ok(_) => while events.try_recv().is_ok() {},
-                    Err(RecvError::Lagged(_)) => {}
-                    Err(RecvError::Closed) => return,
+                received = next(&mut events) => if let Err(RecvError::Closed) = received {
+                    return;
                 },
             }
-            if let Some(error) = reasons.new_error(self.turn().await) {
-                tracing::warn!(%error, "notifications cannot be planned and are planned later");
+            match self.turn().await {
+                Ok(true) => {
+                    reasons.clear();
+                    if events.is_none() {
+                        events = Some(self.events.subscribe().await);
+                    }
+                }
+                Ok(false) => {
+                    reasons.clear();
+                    // Reading the events of a cluster costs something.
+                    events = None;
+                }
+                Err(error) if reasons.is_new(&error) => {
+                    tracing::warn!(%error, "notifications cannot be planned and are planned later");
+                }
+                Err(_) => {}
             }
         }
     }
 
-    /// Plans what there is to plan, and starts the tasks of the channels.
-    async fn turn(&self) -> Result<(), ServiceError> {
+    /// Plans what there is to plan, and starts the tasks of the channels. Returns whether there
+    /// are any, and this process sends to them.
+    async fn turn(&self) -> Result<bool, ServiceError> {
         let context = &self.context;
         if !context.handles.is_leader() {
             // Another node of the cluster sends.
-            return Ok(());
+            return Ok(false);
         }
         let channels = context.handles.store.channels().await?;
         if channels.is_empty() {
-            return Ok(());
+            return Ok(false);
         }
         let rules = context.rules().await?;
         for channel in &channels {
@@ -158,8 +171,19 @@ impl<T: NotificationTransport> Notifier<T> {
         for channel in channels {
             context.clone().start(channel);
         }
-        Ok(())
+        Ok(true)
     }
+}
+
+/// Waits for an event, and forgets those that wait behind it. For ever without a subscription.
+async fn next(events: &mut Option<broadcast::Receiver<Arc<Event>>>) -> Result<(), RecvError> {
+    let Some(events) = events else { return std::future::pending().await };
+    match events.recv().await {
+        Ok(_) => while events.try_recv().is_ok() {},
+        Err(RecvError::Lagged(_)) => {}
+        Err(RecvError::Closed) => return Err(RecvError::Closed),
+    }
+    Ok(())
 }
 
 impl<T: NotificationTransport> Context<T> {

@@ -116,6 +116,8 @@ enum CommitFailure {
     Damaged(ServiceError),
     /// Other nodes have taken these partitions.
     Overtaken(Vec<PartitionId>),
+    /// Another process has the place of this node.
+    Replaced,
     /// The database is unavailable and the service is shutting down.
     Closing,
 }
@@ -126,6 +128,8 @@ enum Recovery {
     Committed,
     /// The database is available, and the last commit has failed.
     NotCommitted,
+    /// The database is unavailable for this node, which owns nothing any more.
+    Replaced,
     /// The database is unavailable and the service is shutting down.
     Closing,
 }
@@ -302,6 +306,7 @@ impl Committer {
             Err(CommitFailure::Overtaken(partitions)) => {
                 refuse_lost(group, &partitions).into_iter().for_each(refuse_moved);
             }
+            Err(CommitFailure::Replaced) => group.into_iter().for_each(refuse_moved),
             Err(CommitFailure::Rejected) => group.into_iter().for_each(refuse_rejected),
             Err(CommitFailure::Damaged(error)) => {
                 group.into_iter().for_each(|set| refuse(set, error.clone()));
@@ -326,7 +331,7 @@ impl Committer {
             match written {
                 Ok(()) => self.complete(set),
                 Err(CommitFailure::Rejected) => refuse_rejected(set),
-                Err(CommitFailure::Overtaken(_)) => refuse_moved(set),
+                Err(CommitFailure::Overtaken(_) | CommitFailure::Replaced) => refuse_moved(set),
                 Err(CommitFailure::Damaged(error)) => refuse(set, error),
                 Err(CommitFailure::Closing) => {
                     refuse(set, closing());
@@ -362,6 +367,7 @@ impl Committer {
                     Recovery::Committed => break,
                     Recovery::NotCommitted if n_full < MAX_FULL => continue,
                     Recovery::NotCommitted => {}
+                    Recovery::Replaced => return Err(CommitFailure::Replaced),
                     Recovery::Closing => return Err(CommitFailure::Closing),
                 }
             }
@@ -369,6 +375,7 @@ impl Committer {
             if error.is_outage() && !error.is_full() {
                 match self.recover(&error).await {
                     Recovery::Committed => break,
+                    Recovery::Replaced => return Err(CommitFailure::Replaced),
                     Recovery::Closing => return Err(CommitFailure::Closing),
                     Recovery::NotCommitted if n_failed < MAX_FAILURES => continue,
                     Recovery::NotCommitted => {}
@@ -423,10 +430,11 @@ impl Committer {
         }
     }
 
-    /// Waits after `error` until the database is available or the service shuts down.
+    /// Waits after `error` until the database is available, this node has been replaced, or the
+    /// service shuts down.
     async fn recover(&mut self, error: &StoreError) -> Recovery {
         let recovered = self.wait_for_database(error).await;
-        if !matches!(recovered, Recovery::Closing) {
+        if matches!(recovered, Recovery::Committed | Recovery::NotCommitted) {
             self.set_available();
         }
         recovered
@@ -471,25 +479,27 @@ impl Committer {
         self.writer.disconnect();
         self.set_unavailable(error);
         let closing = self.closing.clone();
-        match unless_closing(&closing, self.reconnect()).await {
-            Some(true) => Recovery::Committed,
-            Some(false) => Recovery::NotCommitted,
-            None => Recovery::Closing,
-        }
+        let reconnected = unless_closing(&closing, self.reconnect()).await;
+        reconnected.unwrap_or(Recovery::Closing)
     }
 
-    /// Waits until there is a connection; returns whether the last commit has succeeded after
-    /// all.
-    async fn reconnect(&mut self) -> bool {
+    /// Waits until there is a connection, or this node has been replaced: what waits is then
+    /// refused, and devices go to another one.
+    async fn reconnect(&mut self) -> Recovery {
         let mut wait = self.first_retry;
         loop {
             tokio::time::sleep(wait).await;
             wait = (wait * 2).min(RETRY_LONGEST);
-            match self.writer.reconnect().await {
-                Ok(committed) => return committed,
-                Err(error) => self.set_unavailable(&error),
-            }
+            let error = match self.writer.reconnect().await {
+                Ok(true) => return Recovery::Committed,
+                Ok(false) => return Recovery::NotCommitted,
+                Err(error) => error,
+            };
+            self.set_unavailable(&error);
             self.note_lost();
+            if error.is_replaced() && self.writer.is_node() {
+                return Recovery::Replaced;
+            }
         }
     }
 

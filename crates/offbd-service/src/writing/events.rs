@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::broadcast::error::RecvError;
-use tokio::sync::{Notify, broadcast};
+use tokio::sync::{Notify, broadcast, watch};
 use tokio_util::sync::CancellationToken;
 
 use crate::ServiceError;
@@ -22,6 +22,10 @@ const MAX_BUFFERED: usize = 1024;
 
 /// How often a node of a cluster looks for events of others that it was not told of.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
+
+/// Pause of a node after it has read the events of all, and after it has told others of its own:
+/// many events then cost one read. Chosen: nobody who reads an alarm notices it.
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// Events read from the store per query.
 const PAGE: u32 = 256;
@@ -110,28 +114,40 @@ pub(crate) fn line(asset: &str, session: Option<&str>, document: &str) -> String
 pub(crate) struct Events {
     store: Store,
     sender: broadcast::Sender<Arc<Event>>,
-    /// In a cluster, where other nodes have events too: wakes the task that reads them from
-    /// the store, in the order of their ids.
-    reader: Option<Arc<Notify>>,
+    /// In a cluster, where other nodes have events too.
+    of_cluster: Option<Arc<ClusterEvents>>,
+}
+
+/// Wakes the tasks of a node that read the events of all nodes from the store, in the order of
+/// their ids, and tell the others of new ones.
+#[derive(Debug, Default)]
+struct ClusterEvents {
+    read: Notify,
+    announce: Notify,
+    /// Whether the events are read: only while somebody listens.
+    is_read: watch::Sender<bool>,
 }
 
 impl Events {
     pub(crate) fn new(store: Store, in_cluster: bool) -> Self {
-        let reader = in_cluster.then(Arc::default);
-        Self { store, sender: broadcast::Sender::new(MAX_BUFFERED), reader }
+        let of_cluster = in_cluster.then(Arc::default);
+        Self { store, sender: broadcast::Sender::new(MAX_BUFFERED), of_cluster }
     }
 
     /// Publishes an event of this process.
     pub(crate) fn publish(&self, event: Event) {
-        match &self.reader {
-            Some(reader) => reader.notify_one(),
+        match &self.of_cluster {
+            Some(tasks) => {
+                tasks.read.notify_one();
+                tasks.announce.notify_one();
+            }
             None => self.send(event),
         }
     }
 
     /// Says that another process may have events.
     pub(crate) fn wake(&self) {
-        self.reader.iter().for_each(|reader| reader.notify_one());
+        self.of_cluster.iter().for_each(|tasks| tasks.read.notify_one());
     }
 
     fn send(&self, event: Event) {
@@ -139,22 +155,65 @@ impl Events {
         let _ = self.sender.send(Arc::new(event));
     }
 
-    /// Subscribes to be woken by events.
-    pub(crate) fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
-        self.sender.subscribe()
+    /// Subscribes to be woken by events; returns once those of other nodes are read too. If the
+    /// store does not answer for [`READ_TIMEOUT`], they are read later.
+    pub(crate) async fn subscribe(&self) -> broadcast::Receiver<Arc<Event>> {
+        let receiver = self.sender.subscribe();
+        if let Some(tasks) = &self.of_cluster {
+            tasks.read.notify_one();
+            let mut is_read = tasks.is_read.subscribe();
+            let _ = tokio::time::timeout(READ_TIMEOUT, is_read.wait_for(|is| *is)).await;
+        }
+        receiver
     }
 
-    /// In a cluster, reads the events of all nodes and publishes them here, until `closing`.
+    /// In a cluster, reads the events of all nodes and publishes them here while somebody listens,
+    /// until `closing`.
     pub(crate) async fn read_all(self, closing: CancellationToken) {
-        let Some(reader) = self.reader.clone() else { return };
+        let Some(tasks) = self.of_cluster.clone() else { return };
         let forever = async {
             let mut last = None;
             loop {
-                let read = tokio::time::timeout(READ_TIMEOUT, self.read_new(&mut last)).await;
-                if let Err(error) = read.unwrap_or_else(|_| Err(StoreError::too_slow())) {
-                    tracing::debug!(%error, "cannot read the events of the cluster");
+                if self.is_listened_to(&tasks) {
+                    let read = tokio::time::timeout(READ_TIMEOUT, self.read_new(&mut last)).await;
+                    match read.unwrap_or_else(|_| Err(StoreError::too_slow())) {
+                        Ok(()) => drop(tasks.is_read.send_replace(true)),
+                        Err(error) => {
+                            tracing::debug!(%error, "cannot read the events of the cluster");
+                        }
+                    }
+                } else {
+                    last = None;
                 }
-                let _ = tokio::time::timeout(LOOK_EVERY, reader.notified()).await;
+                tokio::time::sleep(PAUSE).await;
+                let _ = tokio::time::timeout(LOOK_EVERY, tasks.read.notified()).await;
+            }
+        };
+        closing.run_until_cancelled(forever).await;
+        // Nobody waits for them any more.
+        tasks.is_read.send_replace(true);
+    }
+
+    fn is_listened_to(&self, tasks: &ClusterEvents) -> bool {
+        if self.sender.receiver_count() > 0 {
+            return true;
+        }
+        tasks.is_read.send_replace(false);
+        // Who has subscribed before this was known counts on the events being read.
+        self.sender.receiver_count() > 0
+    }
+
+    /// In a cluster, tells the other nodes of the events of this one, until `closing`. What they
+    /// are not told of they find by themselves.
+    pub(crate) async fn announce_all(self, closing: CancellationToken) {
+        let Some(tasks) = self.of_cluster.clone() else { return };
+        let forever = async {
+            loop {
+                tasks.announce.notified().await;
+                if let Err(error) = self.store.announce_events().await {
+                    tracing::debug!(%error, "cannot tell other nodes of events");
+                }
+                tokio::time::sleep(PAUSE).await;
             }
         };
         closing.run_until_cancelled(forever).await;
@@ -167,6 +226,7 @@ impl Events {
         };
         *last = Some(after);
         loop {
+            metrics::counter!("offbd_event_reads_total").increment(1);
             let rows = self.store.events(None, after, PAGE).await?;
             let is_last_page = rows.len() < PAGE as usize;
             for row in rows {
@@ -185,7 +245,7 @@ impl Events {
         asset: Option<String>,
         after: Option<i64>,
     ) -> Result<EventFeed, ServiceError> {
-        let receiver = self.sender.subscribe();
+        let receiver = self.subscribe().await;
         let newest = self.store.last_event().await?;
         let last = after.map_or(newest, |id| id.min(newest));
         let (store, backlog) = (self.store.clone(), VecDeque::new());

@@ -26,11 +26,6 @@ impl EventIds {
         Self { n_events, next: None }
     }
 
-    /// Whether the transaction has an event.
-    pub(super) const fn is_used(&self) -> bool {
-        self.next.is_some()
-    }
-
     pub(super) async fn next(&mut self, db: &mut AnyConnection) -> Result<i64, StoreError> {
         let n_events = self.n_events as i64;
         let next = match self.next {

@@ -332,6 +332,12 @@ impl Writer {
         Ok(())
     }
 
+    /// Whether this is the writer of a node of a cluster.
+    #[must_use]
+    pub fn is_node(&self) -> bool {
+        self.role == WriterRole::Node
+    }
+
     /// The partitions that were lost since the last call: others have taken them.
     pub fn lost(&mut self) -> Vec<PartitionId> {
         std::mem::take(&mut self.owned.lost)
@@ -453,7 +459,9 @@ impl Writer {
             return Err(sqlx::Error::PoolClosed.into());
         };
         let nodes = sqlx::query_as(concat!(
-            "SELECT id, name, address, version, leaving FROM node WHERE ",
+            "SELECT id, name, address, version, leaving,
+             CAST(EXTRACT(EPOCH FROM clock_timestamp()) * 1000000 AS BIGINT) AS read_at
+             FROM node WHERE ",
             is_alive!(),
             " ORDER BY id"
         ));
