@@ -65,7 +65,7 @@ fn running_a_scene_file_writes_its_output_files() {
     cli.write("my.json", r#"{"name":"mine","duration_s":0.1,"qy":[{"constant_rad":0.1}]}"#);
     let done = cli.ok("scene my.json -o out --format json");
     let result = object(&done);
-    assert_eq!((&result["scene"], &result["model"]), (&"mine".into(), &"compliant".into()));
+    assert_eq!((&result["scene"], &result["model"]), (&"mine".into(), &"rolling".into()));
     assert!(result["error_m"].as_f64().unwrap() < 1e-4 && result["cpu_s"].as_f64().unwrap() > 0.0);
     exists(&cli, &["out/trajectory.csv", "out/position.svg", "out/position.png", "out/path.svg"]);
     // The sampling interval is a 200th of the scene, as this is shorter than 10 ms.
@@ -223,7 +223,9 @@ fn a_failed_run_reports_the_time_and_keeps_its_results() {
 #[test]
 fn an_unreachable_tolerance_is_explained() {
     let cli = CliFixture::new();
-    let done = cli.run(1, "scene steep --tolerance 1e-12");
+    let one_pass = cli.run(1, "scene steep --tolerance 1e-12").stderr;
+    assert!(one_pass.contains("no model keeps 1e-12 m here: "), "{one_pass}");
+    let done = cli.run(1, "scene steep --tolerance 1e-12 --search");
     assert!(done.stderr.contains("no model and method meets 1e-12 m"), "{}", done.stderr);
     assert!(done.stderr.contains("rodas4"), "{}", done.stderr);
     assert_eq!(done.stdout, "");

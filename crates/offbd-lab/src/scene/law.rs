@@ -97,8 +97,8 @@ impl Law {
                 // Without a branch in the loop, which the compiler then vectorises.
                 Term::Sine { amplitude, frequency, phase } if in_reach(frequency, phase, at) => {
                     let omega = TAU * frequency;
-                    for i in 0..M {
-                        let (sin, cos) = sin_cos(omega * at[i] + phase);
+                    for (i, t) in at.iter().enumerate() {
+                        let (sin, cos) = sin_cos(omega * t + phase);
                         let rate = amplitude * omega;
                         add(i, [amplitude * sin, rate * cos, -rate * omega * sin]);
                     }

@@ -27,7 +27,7 @@ use crate::models::Creeping;
 use bound::ErrorBound;
 use nodes::{EIGHT, FOUR, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
 use offbd_core::plant::{Ball, Motion};
-use window::{BallOnPlate, Path, Rung, SagDecay, State, Window};
+use window::{BallContact, Path, Rung, SagDecay, State, Window};
 
 /// A stretch of a run with one model and one method.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,8 +68,8 @@ pub struct Declined {
 /// Tolerance of RODAS as a share of the wanted accuracy, and at most, m. Chosen: on random
 /// scenes RODAS errs by up to 3.4 times its tolerance, and above 1e-4 m it misses that a
 /// ball just leaves the plate.
-const CONTACT_SHARE: f64 = 0.1;
-const COARSEST_M: f64 = 1e-4;
+const CONTACT_SHARE: f64 = 0.05;
+const COARSEST_M: f64 = 5e-5;
 
 /// Share of the wanted accuracy for the windows before the ball leaves the plate; chosen.
 const WINDOWS_SHARE: f64 = 0.5;
@@ -93,15 +93,17 @@ pub fn one_pass<D: Drive + Clone>(
     tolerance_m: f64,
     mut samples: Option<&mut Samples<'_>>,
 ) -> Result<OnePass, Declined> {
-    let left = match on_the_plate(scene, drive, tolerance_m, samples.as_deref_mut()) {
-        Ok(run) => return Ok(run),
-        Err(left) => left,
-    };
+    let HandOver { left, error_m, mut stages, statistics: before } =
+        match on_the_plate(scene, drive, tolerance_m, samples.as_deref_mut()) {
+            Ran::Whole(run) => return Ok(run),
+            Ran::Until(left) => left,
+        };
+    let Left { at_s: from_s, motion, why } = left;
     let declined = |why: String| Declined { tolerance_m, why };
     let pace = Pace::Tolerance((tolerance_m * CONTACT_SHARE).min(COARSEST_M));
-    let by = Configuration::new(Model::Compliant, Method::Rodas4, pace)
-        .map_err(|invalid| declined(invalid.reason))?;
-    let HandOver { at_s: from_s, motion, why, error_m, mut stages, statistics: before } = left;
+    let by = Configuration::new(Model::Compliant, Method::Rodas4, pace).map_err(|_| {
+        declined(format!("{why}, and the contact model would need a tolerance below 1e-12 m"))
+    })?;
     let run = SceneRunner::new(MOST_STEPS, scene, &by)
         .compliant_from(from_s, &motion, drive, samples)
         .map_err(|failure| declined(failure.to_string()))?;
@@ -115,22 +117,34 @@ pub fn one_pass<D: Drive + Clone>(
     Ok(OnePass { end: run.end, error_m, stages, statistics })
 }
 
-/// The state at which the ball leaves the models on the plate.
-struct HandOver {
+/// The motion at which the ball leaves the models on the plate.
+struct Left {
     at_s: f64,
     motion: Motion,
     why: &'static str,
-    /// Bound of the error that it has until the end, m.
+}
+
+/// A run on the plate until the ball leaves it.
+struct HandOver {
+    left: Left,
+    /// Bound of the error that it has until the end of the scene, m.
     error_m: f64,
     stages: Vec<Stage>,
     statistics: RunStatistics,
 }
 
-impl HandOver {
-    /// Begins with the contact.
-    fn at_once(scene: &Scene, why: &'static str) -> Self {
-        let (motion, statistics) = (scene.initial, RunStatistics::default());
-        Self { at_s: 0.0, motion, why, error_m: 0.0, stages: Vec::new(), statistics }
+/// What came of a run on the plate.
+enum Ran {
+    Whole(OnePass),
+    Until(HandOver),
+}
+
+impl Ran {
+    /// Leaves the whole scene to the contact model.
+    fn not_at_all(scene: &Scene, why: &'static str) -> Self {
+        let left = Left { at_s: 0.0, motion: scene.initial, why };
+        let (stages, statistics) = (Vec::new(), RunStatistics::default());
+        Self::Until(HandOver { left, error_m: 0.0, stages, statistics })
     }
 }
 
@@ -140,13 +154,13 @@ fn on_the_plate<D: Drive + Clone>(
     drive: &mut D,
     tolerance_m: f64,
     samples: Option<&mut Samples<'_>>,
-) -> Result<OnePass, HandOver> {
+) -> Ran {
     let Subject::Ball(ball) = &scene.subject else {
-        return Err(HandOver::at_once(scene, "a block slides"));
+        return Ran::not_at_all(scene, "a block slides");
     };
     if !starts_rolling(scene) {
         let why = "the ball does not start rolling on the plate";
-        return Err(HandOver::at_once(scene, why));
+        return Ran::not_at_all(scene, why);
     }
     let (start, mut target_m) = (drive.clone(), tolerance_m);
     for _ in 0..ATTEMPTS {
@@ -163,14 +177,14 @@ fn on_the_plate<D: Drive + Clone>(
                 tried = pass.roll(Some(samples));
             }
             return match tried {
-                Ok(end) => Ok(pass.run(end)),
-                Err(left) => Err(pass.left(left)),
+                Ok(end) => Ran::Whole(pass.run(end)),
+                Err(left) => Ran::Until(pass.until(left)),
             };
         }
         *drive = start.clone();
         target_m *= REFINED * within.max(LEAST_REFINED);
     }
-    Err(HandOver::at_once(scene, "errors grow too fast on the plate"))
+    Ran::not_at_all(scene, "errors grow too fast on the plate")
 }
 
 /// Numbers of nodes of a window, in ascending order.
@@ -188,8 +202,7 @@ fn first_size(tolerance_m: f64) -> usize {
     }
 }
 
-/// Longest window of the sagging ball, in decays of its slow sag; chosen so that 16 nodes
-/// resolve the decay to 1e-9.
+/// Longest window of the sagging ball, in decays of its slow sag; chosen.
 const DECAYS: f64 = 4.0;
 
 /// Shares of the wanted accuracy for what a model leaves out, for lags, for the method and
@@ -214,7 +227,7 @@ const REMEMBERED: f64 = 0.5;
 struct Pass<'a, D> {
     scene: &'a Scene,
     drive: &'a mut D,
-    ball: BallOnPlate,
+    ball: BallContact,
     creeping: Creeping,
     /// The windows' tolerance, m.
     target: f64,
@@ -248,7 +261,7 @@ impl<'a, D: Drive> Pass<'a, D> {
         Self {
             scene,
             drive,
-            ball: BallOnPlate::new(ball, &scene.plate, &scene.contact),
+            ball: BallContact::new(ball, &scene.plate, &scene.contact),
             creeping: scene.creeping(ball),
             target,
             t: 0.0,
@@ -275,12 +288,13 @@ impl<'a, D: Drive> Pass<'a, D> {
         OnePass { end, error_m, stages: self.stages, statistics }
     }
 
-    fn left(self, left: HandOver) -> HandOver {
-        HandOver { error_m: self.bound_m(), stages: self.stages, ..left }
+    fn until(self, left: Left) -> HandOver {
+        let error_m = self.bound_m();
+        HandOver { left, error_m, stages: self.stages, statistics: self.statistics }
     }
 
     /// Runs until the end, or until the ball does not stay on the plate.
-    fn roll(&mut self, mut samples: Option<&mut Samples<'_>>) -> Result<Motion, HandOver> {
+    fn roll(&mut self, mut samples: Option<&mut Samples<'_>>) -> Result<Motion, Left> {
         let end = self.scene.duration_s;
         let initial = self.scene.initial;
         let mut until = self.drive.begin(0.0, &initial).min(end);
@@ -334,7 +348,7 @@ impl<'a, D: Drive> Pass<'a, D> {
     }
 
     /// Runs one piece of the drive, up to `until`.
-    fn piece(&mut self, until: f64, mut samples: Option<&mut Samples<'_>>) -> Result<(), HandOver> {
+    fn piece(&mut self, until: f64, mut samples: Option<&mut Samples<'_>>) -> Result<(), Left> {
         let time = self.drive.shortest_time_s();
         let still = self.drive.is_still();
         let mut longest = if still { f64::INFINITY } else { time };
@@ -371,25 +385,19 @@ impl<'a, D: Drive> Pass<'a, D> {
                     self.statistics.rejected += 1;
                     longest = half;
                 }
-                Tried::Leaves(why) => return Err(self.hand_over(why)),
+                Tried::Leaves(why) => return Err(self.leave(why)),
                 Tried::TooCoarse => {
-                    return Err(self.hand_over("the motion is too fast for windows"));
+                    return Err(self.leave("the motion is too fast for windows"));
                 }
             }
         }
         Ok(())
     }
 
-    fn hand_over(&self, why: &'static str) -> HandOver {
+    fn leave(&self, why: &'static str) -> Left {
         let (entered_s, entered) = self.entered;
-        HandOver {
-            at_s: self.t,
-            motion: if self.t == entered_s { entered } else { self.motion() },
-            why,
-            error_m: 0.0,
-            stages: Vec::new(),
-            statistics: self.statistics,
-        }
+        let motion = if self.t == entered_s { entered } else { self.motion() };
+        Left { at_s: self.t, motion, why }
     }
 
     /// Tries the window up to `end` with these nodes.

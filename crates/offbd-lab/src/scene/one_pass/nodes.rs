@@ -1,6 +1,11 @@
 //! Gauss–Legendre nodes, and the matrices that integrate and expand functions given at
 //! them.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over the nodes by index are those that the compiler vectorises"
+)]
+
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 

@@ -15,6 +15,11 @@
 //!
 //! with λ₁ < λ₂ the decay rates of the contact, and n the normal force per mass.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over the nodes by index are those that the compiler vectorises"
+)]
+
 use std::f64::consts::SQRT_2;
 
 use super::nodes::Nodes;
@@ -30,7 +35,7 @@ pub(super) enum Rung {
 }
 
 /// A ball and its contact.
-pub(super) struct BallOnPlate {
+pub(super) struct BallContact {
     /// 1/(1 + κ), and κ.
     pub share: f64,
     pub kappa: f64,
@@ -53,7 +58,7 @@ pub(super) struct BallOnPlate {
 /// from there on λ₂/λ₁ is above 3.
 const SEPARATE: f64 = 0.25;
 
-impl BallOnPlate {
+impl BallContact {
     pub(super) fn new(ball: &Ball, plate: &Plate, contact: &Contact) -> Self {
         let (kappa, mass) = (ball.inertia_factor(), ball.mass_kg());
         let (k, d) = (contact.stiffness_n_per_m(), contact.damping_n_s_per_m());
@@ -186,7 +191,7 @@ pub(super) struct Window<'a, const M: usize> {
     pub half: f64,
 }
 
-impl BallOnPlate {
+impl BallContact {
     /// Sweeps until a further sweep would change the acceleration by less than `settled`,
     /// m/s². The rates in `path` are the first guess.
     #[inline(always)]
@@ -303,7 +308,7 @@ impl BallOnPlate {
         for i in 0..M {
             // A ball that lies deeper, and moves with v instead of U, is pressed differently.
             path.normal[i] += path.sag[i] * (ox[i] * ox[i] + oy[i] * oy[i])
-                + 2.0 * (oy[i] * path.offset[0][i] - ox[i] * path.offset[1][i]) * -1.0;
+                + 2.0 * (ox[i] * path.offset[1][i] - oy[i] * path.offset[0][i]);
             path.sag[i] = self.sag_per_normal * path.normal[i];
         }
         if let Some(decay) = decay {
@@ -434,7 +439,7 @@ impl BallOnPlate {
     }
 }
 
-impl BallOnPlate {
+impl BallContact {
     /// Returns bounds of the errors of the creeping ball, of position, m, which does not
     /// add up, and of velocity, m/s. Its offsets lag behind by their settling times, so
     /// that the position falls behind by the product. A sag that is not there yet changes
