@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use crate::table::{Table, numbers};
 use crate::{rig, unusable};
 use offbd_core::plant::Motion;
-use offbd_core::vocabulary::{Invalid, Sample, positive};
+use offbd_core::vocabulary::{Invalid, Sample, in_range, positive};
 use offbd_lab::scene::{Configuration, Method, Model, Pace, Samples, one_pass, run, suits};
 use offbd_lab::simulation::{
     Disturbances, Fault, Preset, Reference, RigModel, SimulatedRig, Variety,
@@ -100,7 +100,8 @@ pub(crate) fn scene(
             if method.is_some() || step_s.is_some() {
                 return Err(unusable("method and step_s need a model"));
             }
-            let tolerance_m = positive("/tolerance_m", tolerance_m, 1.0).map_err(unusable)?;
+            let tolerance_m =
+                in_range("/tolerance_m", tolerance_m, 1e-12..=1.0).map_err(unusable)?;
             let mut laws = scene.laws.clone();
             one_pass(&scene.scene, &mut laws, tolerance_m, Some(&mut samples))
                 .map_err(unusable)?

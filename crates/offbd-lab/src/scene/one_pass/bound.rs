@@ -53,11 +53,15 @@ impl ErrorBound {
         self.duration += duration;
     }
 
+    /// Returns the mean square of the rate of growth so far, 1/s².
+    pub(super) fn mean_square(&self) -> f64 {
+        self.squares / self.duration.max(f64::MIN_POSITIVE)
+    }
+
     /// Returns the bound after `duration` s more without further errors, m, if errors grow
     /// then as they did on average.
     pub(super) fn after(&self, duration: f64) -> f64 {
-        let square = self.squares / self.duration.max(f64::MIN_POSITIVE);
-        let [same, over] = growth(square, duration);
+        let [same, over] = growth(self.mean_square(), duration);
         self.worst.max(self.position * same + self.velocity * over * duration + self.passing)
     }
 }

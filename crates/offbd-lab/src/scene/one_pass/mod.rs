@@ -7,12 +7,15 @@
 //! better model takes over, from the same state:
 //!
 //! 1. The ball rolls, creeps or sags (`window.rs`): Gauss–Legendre windows of up to one
-//!    period of the plate, from 4 to 24 nodes.
-//! 2. Where it slips, flies or passes the edge, the compliant model by RODAS.
+//!    period of the plate, or a whole piece in which it stands still, of 4 to 24 nodes.
+//! 2. From where it slips, flies or passes the edge, the compliant model by RODAS, to the
+//!    end.
 
 mod bound;
 mod nodes;
 mod window;
+
+use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
@@ -26,7 +29,7 @@ use super::{Scene, Subject};
 use crate::models::Creeping;
 use bound::ErrorBound;
 use nodes::{EIGHT, FOUR, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
-use offbd_core::plant::{Ball, Motion};
+use offbd_core::plant::{Ball, GRAVITY_M_S2, Motion, PlateMotion};
 use window::{BallContact, Path, Rung, SagDecay, State, Window};
 
 /// A stretch of a run with one model and one method.
@@ -43,7 +46,9 @@ pub struct Stage {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OnePass {
     pub end: Motion,
-    /// Bound of the largest error of the position (x, y), m.
+    /// Estimate of the largest error of the position (x, y), m. On the plate it is a bound
+    /// for a plate that does not follow the ball; the contact model adds its method's own
+    /// estimate, which may exceed what was wanted although the error does not.
     pub error_m: f64,
     pub stages: Vec<Stage>,
     pub statistics: RunStatistics,
@@ -74,11 +79,19 @@ const COARSEST_M: f64 = 5e-5;
 /// Share of the wanted accuracy for the windows before the ball leaves the plate; chosen.
 const WINDOWS_SHARE: f64 = 0.5;
 
+/// Largest force at the start of a ball on the plate, in weights; chosen: a deeper one is
+/// thrown up.
+const DEEPEST: f64 = 2.0;
+
+/// Maximum number of windows of a run, tried ones included; chosen to bound the time at a
+/// tenth of a second.
+const MOST_WINDOWS: u64 = 100_000;
+
 /// Attempts at ever finer windows; chosen.
 const ATTEMPTS: u32 = 3;
 
-/// Share of the tolerance that a repetition takes of the one that would have sufficed, and
-/// its least share of the last one; chosen.
+/// Share of the tolerance that a repetition takes of the one that would have sufficed, which
+/// counts as at least the second number; chosen.
 const REFINED: f64 = 0.5;
 const LEAST_REFINED: f64 = 1e-3;
 
@@ -107,7 +120,8 @@ pub fn one_pass<D: Drive + Clone>(
     let run = SceneRunner::new(MOST_STEPS, scene, &by)
         .compliant_from(from_s, &motion, drive, samples)
         .map_err(|failure| declined(failure.to_string()))?;
-    stages.push(Stage { from_s, model: Model::Compliant.name(), method: by.method().name(), why });
+    let (model, method) = (Model::Compliant.name(), by.method().name());
+    enter(&mut stages, Stage { from_s, model, method, why });
     let error_m = error_m + run.statistics.method_error_m;
     let statistics = RunStatistics {
         steps: before.steps + run.statistics.steps,
@@ -115,6 +129,12 @@ pub fn one_pass<D: Drive + Clone>(
         method_error_m: error_m,
     };
     Ok(OnePass { end: run.end, error_m, stages, statistics })
+}
+
+/// Begins a stage. A better model from the same time on replaces the cheaper one.
+fn enter(stages: &mut Vec<Stage>, stage: Stage) {
+    stages.pop_if(|last| last.from_s == stage.from_s);
+    stages.push(stage);
 }
 
 /// The motion at which the ball leaves the models on the plate.
@@ -162,6 +182,14 @@ fn on_the_plate<D: Drive + Clone>(
         let why = "the ball does not start rolling on the plate";
         return Ran::not_at_all(scene, why);
     }
+    let contact = BallContact::new(ball, &scene.plate, &scene.contact);
+    if contact.decay.is_none() {
+        return Ran::not_at_all(scene, "the contact oscillates");
+    }
+    let depth = scene.body().rest_height_m() - scene.initial.position.z;
+    if contact.carried(depth) > DEEPEST * GRAVITY_M_S2 {
+        return Ran::not_at_all(scene, "the ball starts too deep in the plate");
+    }
     let (start, mut target_m) = (drive.clone(), tolerance_m);
     for _ in 0..ATTEMPTS {
         // What may have to be repeated takes no samples.
@@ -187,10 +215,14 @@ fn on_the_plate<D: Drive + Clone>(
     Ran::not_at_all(scene, "errors grow too fast on the plate")
 }
 
-/// Numbers of nodes of a window, in ascending order.
-const SIZES: [usize; 5] = [4, 8, 12, 16, 24];
+/// Number of sizes of a window: 4, 8, 12, 16 and 24 nodes.
+const SIZES: usize = 5;
 
-/// Index into [`SIZES`] of the first windows, of one period of the plate, by the wanted
+/// Index of the smallest size that resolves a sag which lags, and its nodes; chosen.
+const SAGGING: usize = 3;
+const FEWEST_FOR_SAG: usize = 16;
+
+/// Index of the size of the first windows, of one period of the plate, by the wanted
 /// accuracy, m; measured on the scene *sine*.
 fn first_size(tolerance_m: f64) -> usize {
     if tolerance_m >= 1e-3 {
@@ -220,9 +252,6 @@ const SURE_TO_ROLL: f64 = 0.9;
 /// takes over; chosen.
 const SHORTEST_PART: f64 = 1.0 / 16.0;
 
-/// Share of the square of the growth rate kept from earlier windows; chosen.
-const REMEMBERED: f64 = 0.5;
-
 /// A run on the plate in progress.
 struct Pass<'a, D> {
     scene: &'a Scene,
@@ -236,12 +265,12 @@ struct Pass<'a, D> {
     /// Start of the current piece, s, with the motion there: creep and sag are still those
     /// of the piece before.
     entered: (f64, Motion),
+    /// Slip at the start, m/s.
+    first_slip: f64,
     /// Normal force per mass that the contact carries, m/s².
     carried: f64,
     rung: Rung,
     size: usize,
-    /// Recent mean square of the rate at which errors grow, 1/s².
-    square: f64,
     bound: ErrorBound,
     stages: Vec<Stage>,
     statistics: RunStatistics,
@@ -252,8 +281,12 @@ enum Tried {
     Taken,
     /// The window is too long for its nodes.
     TooCoarse,
-    /// The ball does not stay on the plate, or does not roll.
+    /// A better model has been entered, which needs windows of its own.
+    Again,
+    /// The ball does not stay on the plate, or does not roll, within this window.
     Leaves(&'static str),
+    /// No shorter window would help.
+    Ends(&'static str),
 }
 
 impl<'a, D: Drive> Pass<'a, D> {
@@ -267,10 +300,10 @@ impl<'a, D: Drive> Pass<'a, D> {
             t: 0.0,
             state: [0.0; 6],
             entered: (0.0, scene.initial),
+            first_slip: 0.0,
             carried: 0.0,
             rung: Rung::Rolling,
             size: first_size(target),
-            square: 0.0,
             bound: ErrorBound::default(),
             stages: Vec::new(),
             statistics: RunStatistics::default(),
@@ -305,6 +338,8 @@ impl<'a, D: Drive> Pass<'a, D> {
             samples.take(0.0, |_| initial);
         }
         self.carried = self.ball.carried(self.state[5]);
+        let [slip_x, slip_y] = self.scene.body().slip(&initial.velocity, &initial.spin);
+        self.first_slip = slip_x.hypot(slip_y);
         self.enter(Rung::Rolling);
         loop {
             self.piece(until, samples.as_deref_mut())?;
@@ -324,9 +359,7 @@ impl<'a, D: Drive> Pass<'a, D> {
             Rung::Creeping => ("creeping", "creep and sag of the contact count"),
             Rung::Sagging => ("sagging", "the sag lags behind its load"),
         };
-        // A better model from the same time on replaces the cheaper one.
-        self.stages.pop_if(|stage| stage.from_s == from_s);
-        self.stages.push(Stage { from_s, model, method, why });
+        enter(&mut self.stages, Stage { from_s, model, method, why });
     }
 
     /// Returns the ball's motion now.
@@ -337,27 +370,33 @@ impl<'a, D: Drive> Pass<'a, D> {
         if let Some([slow, fast]) = self.ball.decay {
             let settled = self.scene.body().rest_height_m() - at.position.z;
             let lag = settled - self.state[5];
-            let sag = self.state[5] - slow / fast * lag;
-            let turn = 2.0 * self.ball.share * (sag - settled);
-            at.position.z = self.scene.body().rest_height_m() - sag;
-            at.velocity += Vector3::new(turn * plate.omega.y, -turn * plate.omega.x, -slow * lag);
-            at.spin +=
-                Vector3::new(turn * plate.omega.x, turn * plate.omega.y, 0.0) / self.ball.radius;
+            self.sink(&mut at, self.state[5] - slow / fast * lag, &plate);
+            at.velocity.z = -slow * lag;
         }
         at
+    }
+
+    /// Moves a ball with a settled sag to the depth `sag`, m.
+    fn sink(&self, at: &mut Motion, sag: f64, plate: &PlateMotion) {
+        let height = self.scene.body().rest_height_m();
+        let turn = 2.0 * self.ball.share * (sag - (height - at.position.z));
+        at.position.z = height - sag;
+        at.velocity += Vector3::new(turn * plate.omega.y, -turn * plate.omega.x, 0.0);
+        at.spin += Vector3::new(turn * plate.omega.x, turn * plate.omega.y, 0.0) / self.ball.radius;
     }
 
     /// Runs one piece of the drive, up to `until`.
     fn piece(&mut self, until: f64, mut samples: Option<&mut Samples<'_>>) -> Result<(), Left> {
         let time = self.drive.shortest_time_s();
         let still = self.drive.is_still();
-        let mut longest = if still { f64::INFINITY } else { time };
+        let whole = if still { f64::INFINITY } else { time };
+        let mut longest = whole;
         let mut size = if still { 0 } else { self.size };
         while self.t < until {
             let sags = self.rung == Rung::Sagging && !still;
             if let (true, Some([slow, _])) = (sags, self.ball.decay) {
                 longest = longest.min(DECAYS / slow);
-                size = size.max(3);
+                size = size.max(SAGGING);
             }
             let left = until - self.t;
             let n = (left / longest - 1e-9).ceil().max(1.0);
@@ -372,24 +411,27 @@ impl<'a, D: Drive> Pass<'a, D> {
                 3 => self.window(&SIXTEEN, half, end, still, last, samples),
                 _ => self.window(&TWENTY_FOUR, half, end, still, last, samples),
             };
-            match tried {
-                Tried::Taken => self.statistics.steps += 1,
-                Tried::TooCoarse if size + 1 < SIZES.len() => {
-                    self.statistics.rejected += 1;
-                    size += 1;
-                    self.size = size;
-                }
-                Tried::TooCoarse | Tried::Leaves(_)
-                    if half * 2.0 > SHORTEST_PART * time.min(self.scene.duration_s) =>
-                {
-                    self.statistics.rejected += 1;
-                    longest = half;
-                }
-                Tried::Leaves(why) => return Err(self.leave(why)),
-                Tried::TooCoarse => {
-                    return Err(self.leave("the motion is too fast for windows"));
-                }
+            let tries = self.statistics.steps + self.statistics.rejected;
+            if tries >= MOST_WINDOWS || self.t + half <= self.t {
+                return Err(self.leave("the motion needs too many windows"));
             }
+            let shortest = SHORTEST_PART * time.min(until - self.entered.0);
+            match tried {
+                Tried::Taken => {
+                    self.statistics.steps += 1;
+                    longest = (2.0 * longest).min(whole);
+                    continue;
+                }
+                Tried::Again => {}
+                Tried::TooCoarse if size + 1 < SIZES => {
+                    size += 1;
+                    self.size = size.max(self.size);
+                }
+                Tried::TooCoarse | Tried::Leaves(_) if half * 2.0 > shortest => longest = half,
+                Tried::Leaves(why) | Tried::Ends(why) => return Err(self.leave(why)),
+                Tried::TooCoarse => return Err(self.leave("the motion is too fast for windows")),
+            }
+            self.statistics.rejected += 1;
         }
         Ok(())
     }
@@ -421,7 +463,8 @@ impl<'a, D: Drive> Pass<'a, D> {
         let window = Window { nodes, plate: plate.pushed(push), start: self.state, half };
         // Allowed error per second of the scene, m/s.
         let allowed = self.target / self.scene.duration_s;
-        let [_, over] = bound::growth(self.square, left);
+        // As errors have grown so far; the bound at the end has the last word.
+        let [same, over] = bound::growth(self.bound.mean_square(), left);
         let settled = SWEEP_SHARE * allowed / (left * over);
         let mut path = self.ball.guess(&window.plate);
         let mut rung = if still { self.rung.min(Rung::Creeping) } else { self.rung };
@@ -441,8 +484,6 @@ impl<'a, D: Drive> Pass<'a, D> {
             if let Some(why) = self.ends(&path, still, [self.t, end], last) {
                 return Tried::Leaves(why);
             }
-            let square = path.worst.growth.max(self.square);
-            let [same, over] = bound::growth(square, left);
             added = bound::WindowError::default();
             let model = match rung {
                 Rung::Rolling => {
@@ -472,16 +513,14 @@ impl<'a, D: Drive> Pass<'a, D> {
             rung = match rung {
                 Rung::Rolling => Rung::Creeping,
                 Rung::Creeping if self.ball.decay.is_some() && !still => Rung::Sagging,
-                _ => return Tried::Leaves("the contact settles too slowly"),
+                _ => return Tried::Ends("the contact settles too slowly"),
             };
-            if rung == Rung::Sagging && M < 16 {
+            if rung == Rung::Sagging && !self.resolves_the_sag::<M>(length) {
                 self.enter(rung);
-                return Tried::TooCoarse;
+                return Tried::Again;
             }
         }
         let (tail, inside) = tails(nodes, &path, half);
-        let square = path.worst.growth.max(self.square);
-        let [same, over] = bound::growth(square, left);
         let local = (tail[1] * left * over + tail[0]) * same.max(1.0);
         if !(local <= METHOD_SHARE * allowed * length && inside <= METHOD_SHARE * self.target) {
             return Tried::TooCoarse;
@@ -491,14 +530,22 @@ impl<'a, D: Drive> Pass<'a, D> {
         added.passing += inside;
         if self.t == self.entered.0 {
             // The plate's acceleration jumps here, the force of the contact does not.
-            let settling = self.ball.settling(&path.worst, self.carried);
+            let slip = if self.t == 0.0 { self.first_slip } else { 0.0 };
+            let settling = self.ball.settling(&path.worst, self.carried)
+                + self.ball.stopping(&path.worst, slip);
             if settling * same > LAG_SHARE * self.target {
-                return Tried::Leaves("the ball slips while the contact settles");
+                return Tried::Ends("the ball slips while the contact settles");
             }
             added.position += settling;
         }
         self.take(&window, &path, rung, end, added, samples);
         Tried::Taken
+    }
+
+    /// Returns whether windows of this length and `M` nodes resolve a sag that lags.
+    fn resolves_the_sag<const M: usize>(&self, length: f64) -> bool {
+        let longest = self.ball.decay.map_or(0.0, |[slow, _]| DECAYS / slow);
+        M >= FEWEST_FOR_SAG && length <= longest * (1.0 + 1e-9)
     }
 
     /// Returns why the ball leaves the plate, or slips, where the nodes do not show it: at
@@ -515,8 +562,13 @@ impl<'a, D: Drive> Pass<'a, D> {
         if self.scene.edges {
             let ground = self.scene.ground();
             let [x, y] = &path.position;
-            let within = (0..M).all(|i| ground.margin_m(x[i], y[i]) > self.target)
-                && ground.margin_m(path.end[0], path.end[1]) > self.target;
+            // Between two nodes the path is bent by at most this.
+            let fastest =
+                (0..M).map(|i| path.rate[0][i].hypot(path.rate[1][i])).fold(0.0, f64::max);
+            let gap = PI * (end - from) / 2.0 / M as f64;
+            let least = self.target + fastest * gap * gap / 8.0;
+            let within = (0..M).all(|i| ground.margin_m(x[i], y[i]) > least)
+                && ground.margin_m(path.end[0], path.end[1]) > least;
             if !within {
                 return Some("the ball passes the edge");
             }
@@ -551,32 +603,36 @@ impl<'a, D: Drive> Pass<'a, D> {
         }
         self.carried = path.worst.last_normal;
         self.bound.carry(path.worst.growth, 2.0 * window.half, &added);
-        self.square = path.worst.growth.max(REMEMBERED * self.square);
         if let Some(samples) = samples {
             let (start, half) = (self.t, window.half);
             samples.take(end, |within| {
                 let s = within.map_or(1.0, |t| (t - start) / half - 1.0);
-                self.sample(window, path, s)
+                self.sample(window, path, rung, s)
             });
         }
         (self.t, self.state) = (end, path.end);
     }
 
     /// Returns the motion at `s`, from −1 to 1, in a window.
-    fn sample<const M: usize>(&self, window: &Window<'_, M>, path: &Path<M>, s: f64) -> Motion {
+    fn sample<const M: usize>(
+        &self,
+        window: &Window<'_, M>,
+        path: &Path<M>,
+        rung: Rung,
+        s: f64,
+    ) -> Motion {
         let Window { nodes, start, half, .. } = window;
         let value = |f: &[f64; M]| nodes.value_and_integral(f, s)[0];
-        let along = [0, 1].map(|a| {
-            let [velocity, integral] = nodes.value_and_integral(&path.velocity(a), s);
-            (start[a] + half * integral, velocity, velocity + value(&path.slip[a]))
-        });
-        let height = self.scene.body().rest_height_m();
-        let r = self.ball.radius;
-        Motion {
-            position: Vector3::new(along[0].0, along[1].0, height - value(&path.sag)),
-            velocity: Vector3::new(along[0].1, along[1].1, 0.0),
-            spin: Vector3::new(-along[1].2 / r, along[0].2 / r, value(&path.free[2])),
+        let [x, y] =
+            [0, 1].map(|a| start[a] + half * nodes.value_and_integral(&path.velocity(a), s)[1]);
+        let [u, v, w] = [0, 1, 2].map(|a| value(&path.free[a]));
+        let t = self.t + half * (1.0 + s);
+        let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), t).at(t);
+        let mut at = self.creeping.leave(&[x, y, u, v, w], &plate);
+        if rung == Rung::Sagging {
+            self.sink(&mut at, value(&path.sag), &plate);
         }
+        at
     }
 }
 

@@ -491,6 +491,12 @@ impl BallContact {
         needed * until * until / (4.0 * (1.0 - demand))
     }
 
+    /// Returns a bound of the error of position, m, while a slip of `slip` m/s at the start
+    /// settles.
+    pub(super) fn stopping(&self, worst: &Worst, slip: f64) -> f64 {
+        self.share * self.kappa * slip * self.creep_lag(worst.first_normal)
+    }
+
     /// Returns the normal force per mass that the contact carries at the depth `sag` at rest,
     /// m/s².
     pub(super) fn carried(&self, sag: f64) -> f64 {
