@@ -272,6 +272,41 @@ fn validate_one_pass_on_scenes_at_random() {
     }
 }
 
+/// Scenes in which a ball that seems to roll does not: it passes an edge between two nodes,
+/// slips at the start, starts deep in the plate, or lies on a contact that oscillates.
+#[test]
+fn validate_one_pass_where_rolling_is_an_illusion() {
+    let law = |term| Law::new(&[term]);
+    let still = |qy| Laws::new(Law::default(), law(Term::Constant(qy)), Vec::new());
+    let mut edge = on_the_chapters_plate(Contact::CHAPTER, 0.79);
+    edge.edges = true;
+    edge.initial.velocity.x = -0.4;
+    edge.initial.spin.y = -0.4 / 0.0127;
+    let slippery = Contact::new(8e5, 1000.0, 0.6, 1.0).unwrap();
+    let mut slips = on_the_chapters_plate(slippery, 1.0);
+    slips.initial.velocity.x = 0.5;
+    let mut deep = on_the_chapters_plate(Contact::CHAPTER, 1.0);
+    deep.initial.position.z -= 5e-4;
+    let springy = Contact::new(200.0, 0.01, 0.6, 1e-4).unwrap();
+    let sine = Term::Sine { amplitude: 0.1, frequency: 1.0, phase: 0.0 };
+    let swings = Laws::new(Law::default(), law(sine), Vec::new());
+    let scenes = [
+        (edge, still(0.05714)),
+        (slips, still(0.0)),
+        (deep, still(0.1)),
+        (on_the_chapters_plate(springy, 1.0), swings),
+    ];
+    for scene in scenes {
+        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
+        let truth = positions(&scene, &tight, 0.01);
+        for tolerance in [1e-3, 1e-5] {
+            let (path, run) = in_one_pass(&scene, tolerance, 0.01);
+            let off = apart(&path, &truth);
+            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}");
+        }
+    }
+}
+
 #[test]
 fn one_pass_declines_what_rounding_forbids() {
     let (scene, laws) = scene("steep");
