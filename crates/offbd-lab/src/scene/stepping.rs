@@ -186,7 +186,7 @@ impl<const N: usize> Integration<'_, '_, N> {
             let longest = tried.as_ref().map_or(f64::INFINITY, |tried| {
                 system.longest_step_s(&self.y).min(system.longest_step_s(&tried.y))
             });
-            let too_long = if h > longest * 2.0 { (h / (longest * 2.0)).powi(4) } else { 0.0 };
+            let too_long = if h > longest { (h / longest).powi(4) } else { 0.0 };
             let scaled = error / budget.share(h);
             if !control.accepts(h, if too_long > scaled { too_long } else { scaled }) {
                 self.statistics.rejected += 1;

@@ -202,6 +202,17 @@ fn in_one_pass(
     (path, run)
 }
 
+/// Asserts that one pass keeps the tolerances, compared with RODAS at 1e-10 m.
+fn keeps(scene: &(Scene, Laws), tolerances: &[f64], every: f64) {
+    let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
+    let truth = positions(scene, &tight, every);
+    for &tolerance in tolerances {
+        let (path, run) = in_one_pass(scene, tolerance, every);
+        let off = apart(&path, &truth);
+        assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}, {scene:?}");
+    }
+}
+
 #[test]
 fn validate_one_pass_on_every_scene() {
     for name in SCENES {
@@ -246,13 +257,7 @@ fn validate_one_pass_over_the_edge_and_after_a_push() {
     let pushed = on_the_chapters_plate(Contact::CHAPTER, 1.0);
     let pushed = (pushed, Laws::new(swing.clone(), swing, vec![push]));
     for scene in [falls, pushed] {
-        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
-        let truth = positions(&scene, &tight, 0.01);
-        for tolerance in [1e-3, 1e-5] {
-            let (path, run) = in_one_pass(&scene, tolerance, 0.01);
-            let off = apart(&path, &truth);
-            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}");
-        }
+        keeps(&scene, &[1e-3, 1e-5], 0.01);
     }
 }
 
@@ -262,13 +267,7 @@ fn validate_one_pass_on_scenes_at_random() {
     let mut dice = Dice(0x2545_F491_4F6C_DD1D);
     for _ in 0..60 {
         let scene = dice.scene();
-        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
-        let truth = positions(&scene, &tight, 0.003);
-        for tolerance in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
-            let (path, run) = in_one_pass(&scene, tolerance, 0.003);
-            let off = apart(&path, &truth);
-            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}, {scene:?}");
-        }
+        keeps(&scene, &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6], 0.003);
     }
 }
 
@@ -297,13 +296,7 @@ fn validate_one_pass_where_rolling_is_an_illusion() {
         (on_the_chapters_plate(springy, 1.0), swings),
     ];
     for scene in scenes {
-        let tight = configuration(Model::Compliant, Method::Rodas4, Pace::Tolerance(1e-10));
-        let truth = positions(&scene, &tight, 0.01);
-        for tolerance in [1e-3, 1e-5] {
-            let (path, run) = in_one_pass(&scene, tolerance, 0.01);
-            let off = apart(&path, &truth);
-            assert!(off <= tolerance, "{run:?} is off by {off:e} m at {tolerance:e}");
-        }
+        keeps(&scene, &[1e-3, 1e-5], 0.01);
     }
 }
 

@@ -23,7 +23,7 @@ const MAX_BUFFERED: usize = 1024;
 /// How often a node of a cluster looks for events of others that it was not told of.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// Pause of a node after it has read the events of all, and after it has told others of its own:
+/// Pause of a node after it has read the events of the cluster, and after it has announced its own:
 /// many events then cost one read. Chosen: nobody who reads an alarm notices it.
 const PAUSE: Duration = Duration::from_millis(100);
 

@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::{Drive, DrivenPlate, PlateNodes};
+use super::rolling_check::SURE_TO_ROLL;
 use super::run::SceneRunner;
 use super::samples::Samples;
 use super::stepping::{MOST_STEPS, RunStatistics};
@@ -83,8 +84,8 @@ const WINDOWS_SHARE: f64 = 0.5;
 /// thrown up.
 const DEEPEST: f64 = 2.0;
 
-/// Maximum number of windows of a run, tried ones included; chosen to bound the time at a
-/// tenth of a second.
+/// Maximum number of windows of a run, tried ones included; chosen to bound the time at
+/// some tenths of a second.
 const MOST_WINDOWS: u64 = 100_000;
 
 /// Attempts at ever finer windows; chosen.
@@ -182,10 +183,9 @@ fn on_the_plate<D: Drive + Clone>(
         let why = "the ball does not start rolling on the plate";
         return Ran::not_at_all(scene, why);
     }
-    let contact = BallContact::new(ball, &scene.plate, &scene.contact);
-    if contact.decay.is_none() {
+    let Some(contact) = BallContact::new(ball, &scene.plate, &scene.contact) else {
         return Ran::not_at_all(scene, "the contact oscillates");
-    }
+    };
     let depth = scene.body().rest_height_m() - scene.initial.position.z;
     if contact.carried(depth) > DEEPEST * GRAVITY_M_S2 {
         return Ran::not_at_all(scene, "the ball starts too deep in the plate");
@@ -193,7 +193,7 @@ fn on_the_plate<D: Drive + Clone>(
     let (start, mut target_m) = (drive.clone(), tolerance_m);
     for _ in 0..ATTEMPTS {
         // What may have to be repeated takes no samples.
-        let mut pass = Pass::new(scene, ball, drive, target_m);
+        let mut pass = Pass::new(scene, (ball, contact), drive, target_m);
         let tried = pass.roll(None);
         let (error_m, share) = (pass.bound_m(), if tried.is_ok() { 1.0 } else { WINDOWS_SHARE });
         let within = share * tolerance_m / error_m;
@@ -201,7 +201,7 @@ fn on_the_plate<D: Drive + Clone>(
             let mut tried = tried;
             if let Some(samples) = samples {
                 *drive = start;
-                pass = Pass::new(scene, ball, drive, target_m);
+                pass = Pass::new(scene, (ball, contact), drive, target_m);
                 tried = pass.roll(Some(samples));
             }
             return match tried {
@@ -244,10 +244,6 @@ const LAG_SHARE: f64 = 0.2;
 const METHOD_SHARE: f64 = 0.3;
 const SWEEP_SHARE: f64 = 0.03;
 
-/// Maximum friction demand of a ball that rolls, as a share of the limit; chosen below 1
-/// as a margin between the nodes.
-const SURE_TO_ROLL: f64 = 0.9;
-
 /// Shortest window, as a share of the plate's shortest time, before the contact model
 /// takes over; chosen.
 const SHORTEST_PART: f64 = 1.0 / 16.0;
@@ -265,8 +261,6 @@ struct Pass<'a, D> {
     /// Start of the current piece, s, with the motion there: creep and sag are still those
     /// of the piece before.
     entered: (f64, Motion),
-    /// Slip at the start, m/s.
-    first_slip: f64,
     /// Normal force per mass that the contact carries, m/s².
     carried: f64,
     rung: Rung,
@@ -281,7 +275,7 @@ enum Tried {
     Taken,
     /// The window is too long for its nodes.
     TooCoarse,
-    /// A better model has been entered, which needs windows of its own.
+    /// A better model has been entered, which needs other windows.
     Again,
     /// The ball does not stay on the plate, or does not roll, within this window.
     Leaves(&'static str),
@@ -290,17 +284,21 @@ enum Tried {
 }
 
 impl<'a, D: Drive> Pass<'a, D> {
-    fn new(scene: &'a Scene, ball: &Ball, drive: &'a mut D, target: f64) -> Self {
+    fn new(
+        scene: &'a Scene,
+        (ball, contact): (&Ball, BallContact),
+        drive: &'a mut D,
+        target: f64,
+    ) -> Self {
         Self {
             scene,
             drive,
-            ball: BallContact::new(ball, &scene.plate, &scene.contact),
+            ball: contact,
             creeping: scene.creeping(ball),
             target,
             t: 0.0,
             state: [0.0; 6],
             entered: (0.0, scene.initial),
-            first_slip: 0.0,
             carried: 0.0,
             rung: Rung::Rolling,
             size: first_size(target),
@@ -338,8 +336,6 @@ impl<'a, D: Drive> Pass<'a, D> {
             samples.take(0.0, |_| initial);
         }
         self.carried = self.ball.carried(self.state[5]);
-        let [slip_x, slip_y] = self.scene.body().slip(&initial.velocity, &initial.spin);
-        self.first_slip = slip_x.hypot(slip_y);
         self.enter(Rung::Rolling);
         loop {
             self.piece(until, samples.as_deref_mut())?;
@@ -367,12 +363,10 @@ impl<'a, D: Drive> Pass<'a, D> {
         let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), self.t).at(self.t);
         let y: [f64; 5] = std::array::from_fn(|i| self.state[i]);
         let mut at = self.creeping.leave(&y, &plate);
-        if let Some([slow, fast]) = self.ball.decay {
-            let settled = self.scene.body().rest_height_m() - at.position.z;
-            let lag = settled - self.state[5];
-            self.sink(&mut at, self.state[5] - slow / fast * lag, &plate);
-            at.velocity.z = -slow * lag;
-        }
+        let [slow, fast] = self.ball.decay;
+        let lag = self.scene.body().rest_height_m() - at.position.z - self.state[5];
+        self.sink(&mut at, self.state[5] - slow / fast * lag, &plate);
+        at.velocity.z = -slow * lag;
         at
     }
 
@@ -393,9 +387,8 @@ impl<'a, D: Drive> Pass<'a, D> {
         let mut longest = whole;
         let mut size = if still { 0 } else { self.size };
         while self.t < until {
-            let sags = self.rung == Rung::Sagging && !still;
-            if let (true, Some([slow, _])) = (sags, self.ball.decay) {
-                longest = longest.min(DECAYS / slow);
+            if self.rung == Rung::Sagging && !still {
+                longest = longest.min(DECAYS / self.ball.decay[0]);
                 size = size.max(SAGGING);
             }
             let left = until - self.t;
@@ -470,9 +463,8 @@ impl<'a, D: Drive> Pass<'a, D> {
         let mut rung = if still { self.rung.min(Rung::Creeping) } else { self.rung };
         let mut added;
         loop {
-            let decay = (rung == Rung::Sagging)
-                .then(|| self.ball.decay.map(|decay| SagDecay::new(nodes, decay, half)))
-                .flatten();
+            let decay =
+                (rung == Rung::Sagging).then(|| SagDecay::new(nodes, self.ball.decay, half));
             self.ball.sweep(&window, rung, decay.as_ref(), settled, &mut path);
             if path.worst.demand.is_nan() || path.worst.demand >= SURE_TO_ROLL {
                 let flies = path.worst.demand == f64::INFINITY;
@@ -512,7 +504,7 @@ impl<'a, D: Drive> Pass<'a, D> {
             }
             rung = match rung {
                 Rung::Rolling => Rung::Creeping,
-                Rung::Creeping if self.ball.decay.is_some() && !still => Rung::Sagging,
+                Rung::Creeping if !still => Rung::Sagging,
                 _ => return Tried::Ends("the contact settles too slowly"),
             };
             if rung == Rung::Sagging && !self.resolves_the_sag::<M>(length) {
@@ -530,9 +522,12 @@ impl<'a, D: Drive> Pass<'a, D> {
         added.passing += inside;
         if self.t == self.entered.0 {
             // The plate's acceleration jumps here, the force of the contact does not.
-            let slip = if self.t == 0.0 { self.first_slip } else { 0.0 };
-            let settling = self.ball.settling(&path.worst, self.carried)
-                + self.ball.stopping(&path.worst, slip);
+            let mut settling = self.ball.settling(&path.worst, self.carried);
+            if self.t == 0.0 {
+                let Motion { velocity, spin, .. } = &self.scene.initial;
+                let [x, y] = self.scene.body().slip(velocity, spin);
+                settling += self.ball.stopping(&path.worst, x.hypot(y));
+            }
             if settling * same > LAG_SHARE * self.target {
                 return Tried::Ends("the ball slips while the contact settles");
             }
@@ -544,8 +539,7 @@ impl<'a, D: Drive> Pass<'a, D> {
 
     /// Returns whether windows of this length and `M` nodes resolve a sag that lags.
     fn resolves_the_sag<const M: usize>(&self, length: f64) -> bool {
-        let longest = self.ball.decay.map_or(0.0, |[slow, _]| DECAYS / slow);
-        M >= FEWEST_FOR_SAG && length <= longest * (1.0 + 1e-9)
+        M >= FEWEST_FOR_SAG && length <= DECAYS / self.ball.decay[0] * (1.0 + 1e-9)
     }
 
     /// Returns why the ball leaves the plate, or slips, where the nodes do not show it: at

@@ -3,14 +3,14 @@
 //!
 //! For a given motion of the plate, the rolling ball's equation is linear in position,
 //! velocity and spin. The plate is evaluated once at each node; a sweep integrates the
-//! rates at the nodes, and evaluates the rates anew on the path found.
+//! rates at the nodes, and evaluates the rates again on the path found.
 //!
 //! The models differ in what a sweep adds: the rolling ball nothing, the creeping ball
 //! the creep and the sag that carry the contact forces (`models/creeping.rs`), the sagging
 //! ball a sag that lags behind its load:
 //!
 //! ```text
-//! m·δ̈ + D·δ̇ + K·δ = F_z         δ ≈ δ₁ − (λ₁/λ₂)·(m·n/K − δ₁),  δ̇₁ = λ₁·(m·n/K − δ₁)
+//! m·δ̈ + D·δ̇ + K·δ = m·n         δ ≈ δ₁ − (λ₁/λ₂)·(m·n/K − δ₁),  δ̇₁ = λ₁·(m·n/K − δ₁)
 //! ```
 //!
 //! with λ₁ < λ₂ the decay rates of the contact, and n the normal force per mass.
@@ -35,23 +35,22 @@ pub(super) enum Rung {
 }
 
 /// A ball and its contact.
+#[derive(Clone, Copy)]
 pub(super) struct BallContact {
     /// 1/(1 + κ), and κ.
     pub share: f64,
-    pub kappa: f64,
+    kappa: f64,
     pub radius: f64,
     /// Height of the ball's centre above the joint, m.
     height: f64,
     pub friction: f64,
-    pub threshold: f64,
+    threshold: f64,
     /// Sag per normal force per mass: m/K, s².
-    pub sag_per_normal: f64,
+    sag_per_normal: f64,
     /// Settling time of the sag: D/K, s.
-    pub sag_lag: f64,
-    /// λ₂, or its real part, 1/s.
-    fast: f64,
-    /// The decay rates λ₁ < λ₂ of the sag, 1/s, if it does not oscillate.
-    pub decay: Option<[f64; 2]>,
+    sag_lag: f64,
+    /// The decay rates λ₁ < λ₂ of the sag, 1/s.
+    pub decay: [f64; 2],
 }
 
 /// Minimum of 1 − 4·m·K/D² at which the two decays of the sag count as separate. Chosen:
@@ -59,14 +58,14 @@ pub(super) struct BallContact {
 const SEPARATE: f64 = 0.25;
 
 impl BallContact {
-    pub(super) fn new(ball: &Ball, plate: &Plate, contact: &Contact) -> Self {
+    /// Returns `None` if the contact oscillates, or nearly does.
+    pub(super) fn new(ball: &Ball, plate: &Plate, contact: &Contact) -> Option<Self> {
         let (kappa, mass) = (ball.inertia_factor(), ball.mass_kg());
         let (k, d) = (contact.stiffness_n_per_m(), contact.damping_n_s_per_m());
         let apart = 1.0 - 4.0 * mass * k / (d * d);
-        let root = apart.max(0.0).sqrt();
         // The smaller rate without cancellation: λ₁·λ₂ = K/m.
-        let fast = d / (2.0 * mass) * (1.0 + root);
-        Self {
+        let fast = d / (2.0 * mass) * (1.0 + apart.max(0.0).sqrt());
+        (apart >= SEPARATE).then(|| Self {
             share: 1.0 / (1.0 + kappa),
             kappa,
             radius: ball.radius_m(),
@@ -75,9 +74,8 @@ impl BallContact {
             threshold: contact.slip_threshold_m_s(),
             sag_per_normal: mass / k,
             sag_lag: d / k,
-            fast,
-            decay: (apart >= SEPARATE).then_some([k / mass / fast, fast]),
-        }
+            decay: [k / mass / fast, fast],
+        })
     }
 
     /// Returns the settling time of the creep under the normal force per mass `normal`,
@@ -97,7 +95,7 @@ pub(super) type State = [f64; 6];
 
 /// The decay of the slow sag at the nodes of a window of length 2·`half`.
 pub(super) struct SagDecay<const M: usize> {
-    pub half: f64,
+    half: f64,
     rate: f64,
     ratio: f64,
     decay: [f64; M],
@@ -141,14 +139,12 @@ pub(super) struct Path<const M: usize> {
     pub sag: [f64; M],
     pub normal: [f64; M],
     pub end: State,
-    /// Sweeps made.
-    pub sweeps: u32,
     /// Change of the acceleration expected of further sweeps, m/s².
     pub unsettled: f64,
     pub worst: Worst,
 }
 
-/// Largest values at the nodes of a window.
+/// Largest values at the nodes of a window, and some at single nodes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Worst {
     /// Fraction of the friction limit in use.
@@ -204,8 +200,7 @@ impl BallContact {
         path: &mut Path<M>,
     ) {
         let mut change = f64::INFINITY;
-        path.sweeps = 0;
-        loop {
+        for sweeps in 1.. {
             integrate(window, path);
             let mut rate = [[0.0; M]; 3];
             let mut friction = [[0.0; M]; 2];
@@ -224,11 +219,10 @@ impl BallContact {
                 }
             }
             path.rate = rate;
-            path.sweeps += 1;
             // The first sweeps change more than the later ones repeat.
-            let gain = if path.sweeps > 2 { (change / before).min(SLOWEST) } else { SLOWEST };
+            let gain = if sweeps > 2 { (change / before).min(SLOWEST) } else { SLOWEST };
             path.unsettled = (change * gain).max(moved / window.half);
-            if path.unsettled <= settled || path.sweeps >= MOST_SWEEPS {
+            if path.unsettled <= settled || sweeps >= MOST_SWEEPS {
                 self.finish(window, rung, &friction, path);
                 return;
             }
@@ -254,7 +248,6 @@ impl BallContact {
             sag: [0.0; M],
             normal: [0.0; M],
             end: [0.0; 6],
-            sweeps: 0,
             unsettled: f64::INFINITY,
             worst: Worst::default(),
         }
@@ -406,24 +399,19 @@ impl BallContact {
     fn slow_sag<const M: usize>(&self, window: &Window<'_, M>, path: &Path<M>) -> f64 {
         let settled = path.normal.map(|n| self.sag_per_normal * n);
         let (start, length) = (window.start[5], 2.0 * window.half);
-        match self.decay {
-            Some(decay) if M > 4 && decay[0] * length < MOST_DECAYS => {
-                SagDecay::new(window.nodes, decay, window.half)
-                    .slow(window.nodes, &settled, start)
-                    .1
-            }
-            Some([slow, _]) => {
-                // The start is forgotten: the settled sag at the end, and how far behind it
-                // the slow sag is.
-                let at = &window.nodes.at;
-                let rise = (settled[M - 1] - settled[M - 2]) / (at[M - 1] - at[M - 2]);
-                let behind = rise / (slow * window.half);
-                let forgotten = 1.0 - (-slow * length).exp();
-                let end = settled[M - 1] + rise * (1.0 - at[M - 1]) - behind * forgotten;
-                end + (start - settled[0]) * (1.0 - forgotten)
-            }
-            None => settled[M - 1],
+        let [slow, _] = self.decay;
+        if M > 4 && slow * length < MOST_DECAYS {
+            let decay = SagDecay::new(window.nodes, self.decay, window.half);
+            return decay.slow(window.nodes, &settled, start).1;
         }
+        // The start is forgotten: the settled sag at the end, and how far behind it the slow
+        // sag is.
+        let at = &window.nodes.at;
+        let rise = (settled[M - 1] - settled[M - 2]) / (at[M - 1] - at[M - 2]);
+        let behind = rise / (slow * window.half);
+        let forgotten = 1.0 - (-slow * length).exp();
+        let end = settled[M - 1] + rise * (1.0 - at[M - 1]) - behind * forgotten;
+        end + (start - settled[0]) * (1.0 - forgotten)
     }
 
     /// Returns bounds of what creep and sag, left out, change in a window: v − U, m/s, and
@@ -466,7 +454,7 @@ impl BallContact {
     /// delay, but not the right second moment, 1/λ₂², and creep follows m·n instead of
     /// F_z.
     pub(super) fn sagging_lag(&self, worst: &Worst, slow_sag: f64) -> [f64; 2] {
-        let [slow, fast] = self.decay.unwrap_or([1.0, f64::MIN_POSITIVE]);
+        let [slow, fast] = self.decay;
         let sag = self.sag_per_normal * worst.normal;
         let (late, unsettled) = (slow / (fast * fast), self.unsettled(worst, slow_sag));
         let sunk =
@@ -486,7 +474,7 @@ impl BallContact {
         if demand * normal <= carried {
             return 0.0;
         }
-        let until = ((normal - carried) / (normal * (1.0 - demand))).ln() / self.fast;
+        let until = ((normal - carried) / (normal * (1.0 - demand))).ln() / self.decay[1];
         let needed = SQRT_2 * self.friction * demand * normal;
         needed * until * until / (4.0 * (1.0 - demand))
     }
