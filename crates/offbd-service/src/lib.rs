@@ -51,7 +51,7 @@
 //! - `tags`: what is permitted as a tag of a rig.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `background`: long computations on threads of a low priority.
-//! - `simulation`, a test: the whole service without threads, with devices and faults.
+//! - `simulation_tests`: the whole service without threads, with devices and faults.
 //! - [`access`]: roles and rights, tokens, JSON Web Tokens, audit entries.
 //!
 //! Contains no HTTP and no SQL. The wall clock is read only for timestamps that are stored

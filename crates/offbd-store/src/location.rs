@@ -2,7 +2,7 @@
 //! to it.
 //!
 //! Statements are the same for both, through sqlx's `Any`. What differs is here, in
-//! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `mod.rs`.
+//! `checkpoint.rs` and `backup.rs` (SQLite only), and in the error codes of `lib.rs`.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -193,6 +193,11 @@ impl<'a, D: Drive> DrivenPlate<'a, D> {
         Self { drive, push, still, last: Cell::new((t, now)) }
     }
 
+    /// Returns whether the plate stands still throughout the piece.
+    pub(super) const fn is_still(&self) -> bool {
+        self.still.is_some()
+    }
+
     #[inline]
     pub(super) fn at(&self, t: f64) -> PlateMotion {
         if let Some(still) = self.still {

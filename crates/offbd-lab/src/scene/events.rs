@@ -7,7 +7,7 @@ use super::samples::StepInterpolant;
 use super::stepping::{ErrorBudget, Failure, Integration, MOST_CHANGES, StepObserver, next_step};
 use crate::methods::StepControl;
 use offbd_core::maths::{System, dopri5};
-use offbd_core::plant::{Motion, Phase};
+use offbd_core::plant::{Ground, Motion, Phase};
 
 /// A change of phase in a run, and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,11 +34,16 @@ pub(super) struct PhaseTracker {
     pub events: Vec<Event>,
     since_s: f64,
     changes: u32,
+    /// Time for which a damper holds a body that leaves the plate, s.
+    hold_s: f64,
 }
 
 impl PhaseTracker {
-    pub(super) const fn new() -> Self {
-        Self { phase: None, events: Vec::new(), since_s: f64::NEG_INFINITY, changes: 0 }
+    /// `hold_s`: time for which a damper holds a body that leaves the plate, s; 0 for a
+    /// rigid plate.
+    pub(super) const fn new(hold_s: f64) -> Self {
+        let since_s = f64::NEG_INFINITY;
+        Self { phase: None, events: Vec::new(), since_s, changes: 0, hold_s }
     }
 
     /// Integrates one piece of the drive, up to `until`.
@@ -52,8 +57,11 @@ impl PhaseTracker {
     ) -> Result<(), Failure> {
         self.enter(system, integration);
         let mut first = system.rate(integration.t, &integration.y);
+        // On a plate that stands still, accelerations are constant within a phase.
+        let whole = system.plate.is_still() && system.model.ground == Ground::Endless;
         while integration.t < until {
-            let (h, end) = next_step(integration.t, until, control.h);
+            let longest = if whole { f64::INFINITY } else { control.h };
+            let (h, end) = next_step(integration.t, until, longest);
             let mut last = first;
             let tried = dopri5(system, integration.t, &integration.y, h, &mut last);
             let error = budget.at_the_end(&tried.error, 3, integration.t, h);
@@ -82,6 +90,7 @@ impl PhaseTracker {
                     )
                     .y;
                     integration.take(system, at, y, observer)?;
+                    self.hold(system, integration, until, observer)?;
                     self.enter(system, integration);
                     self.changes += 1;
                     if self.changes > MOST_CHANGES {
@@ -92,6 +101,27 @@ impl PhaseTracker {
             }
         }
         Ok(())
+    }
+
+    /// Holds a body that is about to leave the plate.
+    fn hold<'p, D: Drive, W: StepObserver<DrivenSliding<'p, D>, 9>>(
+        &self,
+        system: &DrivenSliding<'p, D>,
+        integration: &mut Integration<'_, '_, 9>,
+        until: f64,
+        observer: &mut W,
+    ) -> Result<(), Failure> {
+        let (t, h) = (integration.t, self.hold_s.min(until - integration.t));
+        if h <= 0.0 || !matches!(system.phase, Phase::Contact(_)) {
+            return Ok(());
+        }
+        let at = Motion::from_row(&integration.y);
+        if system.model.enter(&at, &system.plate.at(t)).0 != Phase::Flight {
+            return Ok(());
+        }
+        let mut first = system.rate(t, &integration.y);
+        let y = dopri5(system, t, &integration.y, h, &mut first).y;
+        integration.take(system, t + h, y, observer)
     }
 
     /// Switches to the phase that the current motion implies.

@@ -1,6 +1,6 @@
 /**
  * The plate and the ball in 3D, with the twin's ball as a ghost. Frames and signs are those of
- * ARCHITECTURE.md: z up, the joint in the centre of the plate's upper face, world from plate =
+ * docs/notation.md: z up, the joint in the centre of the plate's upper face, world from plate =
  * Rx(qx)·Ry(qy). Loaded only when it is shown.
  */
 import { AmbientLight, Color, DirectionalLight, Group, HemisphereLight, Scene, WebGLRenderer } from "three";

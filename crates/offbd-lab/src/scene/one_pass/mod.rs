@@ -8,11 +8,13 @@
 //!
 //! 1. The ball rolls, creeps or sags (`window.rs`): Gauss–Legendre windows of up to one
 //!    period of the plate, or a whole piece in which it stands still, of 4 to 24 nodes.
-//! 2. From where it slips, flies or passes the edge, the compliant model by RODAS, to the
-//!    end.
+//! 2. From where it slips or flies, the rigid model to the end, if the contact is stiff and
+//!    the bound allows it (`slide.rs`).
+//! 3. Otherwise from there the compliant model by RODAS, to the end.
 
 mod bound;
 mod nodes;
+mod slide;
 mod window;
 
 use std::f64::consts::PI;
@@ -22,7 +24,7 @@ use nalgebra::Vector3;
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::{Drive, DrivenPlate, PlateNodes};
 use super::rolling_check::SURE_TO_ROLL;
-use super::run::SceneRunner;
+use super::run::{RunOutcome, SceneRunner};
 use super::samples::Samples;
 use super::stepping::{MOST_STEPS, RunStatistics};
 use super::survey::starts_rolling;
@@ -31,6 +33,7 @@ use crate::models::Creeping;
 use bound::ErrorBound;
 use nodes::{EIGHT, FOUR, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
 use offbd_core::plant::{Ball, GRAVITY_M_S2, Motion, PlateMotion};
+use slide::Slide;
 use window::{BallContact, Path, Rung, SagDecay, State, Window};
 
 /// A stretch of a run with one model and one method.
@@ -48,8 +51,9 @@ pub struct Stage {
 pub struct OnePass {
     pub end: Motion,
     /// Estimate of the largest error of the position (x, y), m. On the plate it is a bound
-    /// for a plate that does not follow the ball; the contact model adds its method's own
-    /// estimate, which may exceed what was wanted although the error does not.
+    /// for a plate that does not follow the ball, and the sliding model adds one of what a
+    /// hard contact changes; the contact model adds its method's own estimate, which may
+    /// exceed what was wanted although the error does not.
     pub error_m: f64,
     pub stages: Vec<Stage>,
     pub statistics: RunStatistics,
@@ -82,7 +86,7 @@ const WINDOWS_SHARE: f64 = 0.5;
 
 /// Largest force at the start of a ball on the plate, in weights; chosen: a deeper one is
 /// thrown up.
-const DEEPEST: f64 = 2.0;
+pub(super) const DEEPEST: f64 = 2.0;
 
 /// Maximum number of windows of a run, tried ones included; chosen to bound the time at
 /// some tenths of a second.
@@ -107,29 +111,24 @@ pub fn one_pass<D: Drive + Clone>(
     tolerance_m: f64,
     mut samples: Option<&mut Samples<'_>>,
 ) -> Result<OnePass, Declined> {
-    let HandOver { left, error_m, mut stages, statistics: before } =
-        match on_the_plate(scene, drive, tolerance_m, samples.as_deref_mut()) {
-            Ran::Whole(run) => return Ok(run),
-            Ran::Until(left) => left,
-        };
-    let Left { at_s: from_s, motion, why } = left;
+    let left = match on_the_plate(scene, drive, tolerance_m, samples.as_deref_mut()) {
+        Ran::Whole(run) => return Ok(run),
+        Ran::Until(left) => left,
+    };
+    let slide = Slide { scene, tolerance_m, from: &left };
+    if let Some(slid) = slide.run(drive, samples.as_deref_mut()) {
+        return Ok(left.then(Model::Sliding, Method::Dopri5, slid));
+    }
+    let Left { at_s, motion, why } = &left.left;
     let declined = |why: String| Declined { tolerance_m, why };
     let pace = Pace::Tolerance((tolerance_m * CONTACT_SHARE).min(COARSEST_M));
     let by = Configuration::new(Model::Compliant, Method::Rodas4, pace).map_err(|_| {
         declined(format!("{why}, and the contact model would need a tolerance below 1e-12 m"))
     })?;
     let run = SceneRunner::new(MOST_STEPS, scene, &by)
-        .compliant_from(from_s, &motion, drive, samples)
+        .compliant_from(*at_s, motion, drive, samples)
         .map_err(|failure| declined(failure.to_string()))?;
-    let (model, method) = (Model::Compliant.name(), by.method().name());
-    enter(&mut stages, Stage { from_s, model, method, why });
-    let error_m = error_m + run.statistics.method_error_m;
-    let statistics = RunStatistics {
-        steps: before.steps + run.statistics.steps,
-        rejected: before.rejected + run.statistics.rejected,
-        method_error_m: error_m,
-    };
-    Ok(OnePass { end: run.end, error_m, stages, statistics })
+    Ok(left.then(Model::Compliant, by.method(), run))
 }
 
 /// Begins a stage. A better model from the same time on replaces the cheaper one.
@@ -152,6 +151,22 @@ struct HandOver {
     error_m: f64,
     stages: Vec<Stage>,
     statistics: RunStatistics,
+}
+
+impl HandOver {
+    /// Returns the whole run, which `run` has ended.
+    fn then(self, model: Model, method: Method, run: RunOutcome) -> OnePass {
+        let Self { left, error_m, mut stages, statistics: before } = self;
+        let (model, method) = (model.name(), method.name());
+        enter(&mut stages, Stage { from_s: left.at_s, model, method, why: left.why });
+        let error_m = error_m + run.statistics.method_error_m;
+        let statistics = RunStatistics {
+            steps: before.steps + run.statistics.steps,
+            rejected: before.rejected + run.statistics.rejected,
+            method_error_m: error_m,
+        };
+        OnePass { end: run.end, error_m, stages, statistics }
+    }
 }
 
 /// What came of a run on the plate.
@@ -277,8 +292,9 @@ enum Tried {
     TooCoarse,
     /// A better model has been entered, which needs other windows.
     Again,
-    /// The ball does not stay on the plate, or does not roll, within this window.
-    Leaves(&'static str),
+    /// The ball does not stay on the plate, or does not roll, within this window. A window of
+    /// this share of it may do.
+    Leaves(&'static str, f64),
     /// No shorter window would help.
     Ends(&'static str),
 }
@@ -420,8 +436,11 @@ impl<'a, D: Drive> Pass<'a, D> {
                     size += 1;
                     self.size = size.max(self.size);
                 }
-                Tried::TooCoarse | Tried::Leaves(_) if half * 2.0 > shortest => longest = half,
-                Tried::Leaves(why) | Tried::Ends(why) => return Err(self.leave(why)),
+                Tried::TooCoarse if half * 2.0 > shortest => longest = half,
+                Tried::Leaves(_, share) if half * 4.0 * share > shortest => {
+                    longest = half * 2.0 * share;
+                }
+                Tried::Leaves(why, _) | Tried::Ends(why) => return Err(self.leave(why)),
                 Tried::TooCoarse => return Err(self.leave("the motion is too fast for windows")),
             }
             self.statistics.rejected += 1;
@@ -468,13 +487,15 @@ impl<'a, D: Drive> Pass<'a, D> {
             self.ball.sweep(&window, rung, decay.as_ref(), settled, &mut path);
             if path.worst.demand.is_nan() || path.worst.demand >= SURE_TO_ROLL {
                 let flies = path.worst.demand == f64::INFINITY;
-                return Tried::Leaves(if flies { "the ball flies" } else { "the ball slips" });
+                let why = if flies { "the ball flies" } else { "the ball slips" };
+                let sure = path.worst.sure.checked_sub(1).map_or(0.0, |i| 1.0 + nodes.at[i]);
+                return Tried::Leaves(why, sure / 2.0);
             }
             if path.unsettled > settled || path.unsettled.is_nan() {
                 return Tried::TooCoarse;
             }
             if let Some(why) = self.ends(&path, still, [self.t, end], last) {
-                return Tried::Leaves(why);
+                return Tried::Leaves(why, 0.5);
             }
             added = bound::WindowError::default();
             let model = match rung {

@@ -24,6 +24,7 @@ use std::f64::consts::SQRT_2;
 
 use super::nodes::Nodes;
 use crate::scene::drive::PlateNodes;
+use crate::scene::rolling_check::SURE_TO_ROLL;
 use offbd_core::plant::{Ball, Contact, Plate};
 
 /// A model of a ball on the plate, from the cheapest to the most accurate.
@@ -57,15 +58,22 @@ pub(super) struct BallContact {
 /// from there on λ₂/λ₁ is above 3.
 const SEPARATE: f64 = 0.25;
 
+/// Returns the decay rates λ₁ < λ₂ of the sag of a body of `mass` kg, 1/s, or `None` if the
+/// contact oscillates, or nearly does.
+pub(super) fn decays(mass: f64, contact: &Contact) -> Option<[f64; 2]> {
+    let (k, d) = (contact.stiffness_n_per_m(), contact.damping_n_s_per_m());
+    let apart = 1.0 - 4.0 * mass * k / (d * d);
+    // The smaller rate without cancellation: λ₁·λ₂ = K/m.
+    let fast = d / (2.0 * mass) * (1.0 + apart.max(0.0).sqrt());
+    (apart >= SEPARATE).then(|| [k / mass / fast, fast])
+}
+
 impl BallContact {
     /// Returns `None` if the contact oscillates, or nearly does.
     pub(super) fn new(ball: &Ball, plate: &Plate, contact: &Contact) -> Option<Self> {
         let (kappa, mass) = (ball.inertia_factor(), ball.mass_kg());
         let (k, d) = (contact.stiffness_n_per_m(), contact.damping_n_s_per_m());
-        let apart = 1.0 - 4.0 * mass * k / (d * d);
-        // The smaller rate without cancellation: λ₁·λ₂ = K/m.
-        let fast = d / (2.0 * mass) * (1.0 + apart.max(0.0).sqrt());
-        (apart >= SEPARATE).then(|| Self {
+        Some(Self {
             share: 1.0 / (1.0 + kappa),
             kappa,
             radius: ball.radius_m(),
@@ -74,7 +82,7 @@ impl BallContact {
             threshold: contact.slip_threshold_m_s(),
             sag_per_normal: mass / k,
             sag_lag: d / k,
-            decay: [k / mass / fast, fast],
+            decay: decays(mass, contact)?,
         })
     }
 
@@ -149,6 +157,8 @@ pub(super) struct Path<const M: usize> {
 pub(super) struct Worst {
     /// Fraction of the friction limit in use.
     pub demand: f64,
+    /// Number of nodes before the first at which the ball is not sure to roll.
+    pub sure: usize,
     /// The same at the first node, and the normal force per mass there and at the last
     /// node, m/s².
     pub first_demand: f64,
@@ -385,6 +395,7 @@ impl BallContact {
             growth[i] = square + self.share * az.abs();
         }
         worst.demand = demand.into_iter().fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a });
+        worst.sure = demand.iter().take_while(|&&demand| demand < SURE_TO_ROLL).count();
         worst.first_demand = demand[0];
         (worst.first_normal, worst.last_normal) = (path.normal[0], path.normal[M - 1]);
         worst.least_normal = least_normal;
