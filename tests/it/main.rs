@@ -14,6 +14,7 @@ mod bounds;
 mod bus;
 mod cli;
 mod cluster;
+mod coding;
 #[cfg(feature = "parquet")]
 mod crash;
 mod damage;

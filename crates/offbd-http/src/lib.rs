@@ -15,6 +15,7 @@ mod asyncapi;
 mod body;
 mod calibrations;
 mod cluster;
+mod coding;
 mod credential;
 mod deliver;
 mod description;

@@ -2,12 +2,15 @@
 //! its status.
 
 use axum::extract::rejection::{PathRejection, QueryRejection};
-use axum::http::header::{CONTENT_TYPE, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE};
+use axum::http::header::{
+    ACCEPT_ENCODING, CONTENT_TYPE, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE,
+};
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::coding::{ACCEPTED_CODINGS, UNKNOWN_CODING};
 use super::retry::retry_after_s;
 use offbd_core::vocabulary::Invalid;
 use offbd_service::{RETRY_AFTER_S, ServiceError};
@@ -105,6 +108,11 @@ impl IntoResponse for Problem {
         }
         if status == StatusCode::UNAUTHORIZED {
             headers.insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"offbd\""));
+        }
+        // Only then: with the header a 415 speaks of the coding, not of the media type
+        // (RFC 9110, section 12.5.3).
+        if self.kind.ends_with(UNKNOWN_CODING) {
+            headers.insert(ACCEPT_ENCODING, HeaderValue::from_static(ACCEPTED_CODINGS));
         }
         response.extensions_mut().insert(self);
         response
