@@ -18,6 +18,7 @@ mod coding;
 #[cfg(feature = "parquet")]
 mod crash;
 mod damage;
+mod editions;
 mod engine_snapshot;
 mod fault_memory;
 mod formats;

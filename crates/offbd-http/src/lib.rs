@@ -20,6 +20,7 @@ mod credential;
 mod deliver;
 mod description;
 mod drive_cycles;
+mod edition;
 mod events;
 mod faults;
 mod fleet;
