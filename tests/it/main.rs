@@ -14,9 +14,11 @@ mod bounds;
 mod bus;
 mod cli;
 mod cluster;
+mod coding;
 #[cfg(feature = "parquet")]
 mod crash;
 mod damage;
+mod editions;
 mod engine_snapshot;
 mod fault_memory;
 mod formats;

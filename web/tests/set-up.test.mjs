@@ -120,6 +120,29 @@ test("a name that is taken is refused in words for people", async () => {
   await view.done();
 });
 
+test("a description that was changed is the one that is changed next", async () => {
+  await ask(service.url, "POST", "/assets", { name: "twice" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/twice/set-up`);
+  await view.getByLabel("Mass").fill("51");
+  await view.getByRole("button", { name: "Save and continue" }).click();
+  await view.getByRole("button", { name: "1. Describe" }).click();
+  await view.getByLabel("Radius").fill("21");
+  await view.getByRole("button", { name: "Save and continue" }).click();
+  await view.getByText("Waiting for the first sample").waitFor();
+  const { ball } = await ask(service.url, "GET", "/assets/twice");
+  assert.deepEqual([ball.mass_kg, ball.radius_m], [0.051, 0.021]);
+  // Meanwhile somebody else changes it.
+  await view.getByRole("button", { name: "1. Describe" }).click();
+  await ask(service.url, "PUT", "/assets/twice", { name: "twice", ball: { ...ball, mass_kg: 0.06 } });
+  await view.getByLabel("Radius").fill("22");
+  await view.getByRole("button", { name: "Save and continue" }).click();
+  await view.getByText("Somebody has changed this since the page showed it").waitFor();
+  const now = await ask(service.url, "GET", "/assets/twice");
+  assert.deepEqual([now.ball.mass_kg, now.ball.radius_m], [0.06, 0.021]);
+  await view.done();
+});
+
 test("a recording without motion is refused with a message", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);

@@ -84,3 +84,20 @@ test("a wall screen shows a tile for each rig, the worst group first", async () 
   assert.deepEqual(view.errors, []);
   await view.done();
 });
+
+test("tags that somebody else has changed meanwhile are not overwritten", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/shelf`);
+  await view.getByRole("button", { name: "Change tags" }).click();
+  await ask(service.url, "PUT", "/assets/shelf/tags", { tags: ["hall-3"] });
+  await view.getByRole("textbox", { name: "Tags, separated by blanks" }).fill("hall-1 mine");
+  await view.getByRole("button", { name: "Save" }).click();
+  await view.getByText("Somebody has changed this since the page showed it").waitFor();
+  assert.deepEqual((await ask(service.url, "GET", "/assets/shelf/tags")).tags, ["hall-3"]);
+  await view.reload();
+  await view.getByRole("button", { name: "Change tags" }).click();
+  await view.getByRole("textbox", { name: "Tags, separated by blanks" }).fill("hall-1 mine");
+  await view.getByRole("button", { name: "Save" }).click();
+  await view.getByRole("link", { name: "mine" }).waitFor();
+  await view.done();
+});

@@ -77,6 +77,7 @@ fn with_diagnosis(router: GuardedRouter) -> GuardedRouter {
         .routes(Administer, routes!(notifications::delete_channel))
         .routes(Administer, routes!(notifications::test))
         .routes(Read, routes!(notifications::rules))
+        .routes(Read, routes!(notifications::rule))
         .routes(Administer, routes!(notifications::create_rule))
         .routes(Administer, routes!(notifications::put_rule, notifications::delete_rule))
         .routes(Read, routes!(notifications::deliveries))

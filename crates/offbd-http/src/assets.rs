@@ -8,6 +8,7 @@ use axum::http::{HeaderMap, StatusCode};
 use axum::response::IntoResponse;
 use serde::Deserialize;
 
+use super::edition::{IfMatch, Tagged, tagged};
 use super::layers::record_asset;
 use super::{App, AssetPath, Problem, Query, json_body, page_limit};
 use offbd_service::Service;
@@ -45,7 +46,8 @@ pub(super) async fn list(
 /// Registers an asset; the body is its asset file.
 #[utoipa::path(post, path = "/assets", tag = "assets", operation_id = "create_asset",
     request_body = AssetView, responses(
-        (status = 201, body = AssetView, description = "Created; `Location` has its URL"),
+        (status = 201, body = AssetView, description = "Created; `Location` has its URL",
+            headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
         (status = 400, body = Problem,
             description = "Malformed asset file; `pointer` names the element"),
         (status = 409, body = Problem, description = "An asset of this name exists"),
@@ -57,38 +59,45 @@ pub(super) async fn create(
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
     let document = json_body::read(&app, &headers, body, MAX_ASSET_BYTES).await?;
-    let view = app.service.create_asset(&document).await?;
-    record_asset(&view.name);
-    let location = format!("/api/v1/assets/{}", view.name);
-    Ok((StatusCode::CREATED, [(LOCATION, location)], Json(view)))
+    let made = app.service.create_asset(&document).await?;
+    record_asset(&made.value.name);
+    let location = format!("/api/v1/assets/{}", made.value.name);
+    Ok((StatusCode::CREATED, [(LOCATION, location)], tagged(made)))
 }
 
 /// Returns the asset file with all defaults filled in.
 #[utoipa::path(get, path = "/assets/{asset}", tag = "assets", operation_id = "get_asset",
     params(("asset" = String, description = "Name of the asset")),
-    responses((status = 200, body = AssetView), (status = 404, body = Problem)))]
+    responses((status = 200, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,
-) -> Result<Json<AssetView>, Problem> {
-    Ok(Json(service.asset(&asset).await?))
+) -> Result<Tagged<AssetView>, Problem> {
+    Ok(tagged(service.asset_edition(&asset).await?))
 }
 
 /// Replaces the asset file, or registers the asset. An open session keeps the asset file
 /// that it started with; the next session uses the new one.
 #[utoipa::path(put, path = "/assets/{asset}", tag = "assets", operation_id = "put_asset",
-    params(("asset" = String, description = "Name of the asset")), request_body = AssetView,
-    responses((status = 200, body = AssetView), (status = 201, body = AssetView),
-        (status = 400, body = Problem), (status = 422, body = Problem)))]
+    params(("asset" = String, description = "Name of the asset"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+    request_body = AssetView,
+    responses((status = 200, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 201, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 400, body = Problem),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
+        (status = 422, body = Problem)))]
 pub(super) async fn put(
     State(app): State<App>,
     AssetPath(asset): AssetPath,
+    IfMatch(expected): IfMatch,
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
     let document = json_body::read(&app, &headers, body, MAX_ASSET_BYTES).await?;
-    let (view, created) = app.service.put_asset(&asset, &document).await?;
-    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, Json(view)))
+    let (edition, created) = app.service.put_asset(&asset, &document, &expected).await?;
+    Ok((if created { StatusCode::CREATED } else { StatusCode::OK }, tagged(edition)))
 }
 
 /// Deletes an asset with its sessions, recordings and faults. The asset is hidden
@@ -96,13 +105,16 @@ pub(super) async fn put(
 /// longer than 60 s is answered with 503 and continues. Creating an asset of the same name
 /// before it has finished gets 429.
 #[utoipa::path(delete, path = "/assets/{asset}", tag = "assets", operation_id = "delete_asset",
-    params(("asset" = String, description = "Name of the asset")),
-    responses((status = 204), (status = 404, body = Problem)))]
+    params(("asset" = String, description = "Name of the asset"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+    responses((status = 204), (status = 404, body = Problem),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
 pub(super) async fn delete(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,
+    IfMatch(expected): IfMatch,
 ) -> Result<StatusCode, Problem> {
-    service.delete_asset(&asset).await?;
+    service.delete_asset(&asset, expected).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -1,16 +1,18 @@
 //! Reading request bodies under limits of size, time and total memory.
 
 use std::collections::HashMap;
+use std::io;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use futures_util::StreamExt;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use super::Problem;
+use super::coding::Coding;
 use offbd_service::ServiceError;
 
 /// The limit of request body bytes in memory at a time, over all requests. A request
@@ -80,44 +82,66 @@ pub(super) struct ReservedBytes {
     permits: Vec<OwnedSemaphorePermit>,
 }
 
-/// Reads a body of at most `limit` bytes within `time`.
+/// Reads a body of at most `limit` bytes within `time`, and decompresses it as the headers say.
+/// The limit is for the bytes that arrive and for those that they expand to.
 ///
 /// # Errors
-/// 413 if it is longer, 408 if it takes longer, 429 if the budget is exhausted, and 400
-/// if the client aborts.
+/// 413 if it is longer, 408 if it takes longer, 415 if its coding is unknown, 429 if the budget is
+/// exhausted, and 400 if the client aborts or the body cannot be decompressed.
 pub(super) async fn read(
+    headers: &HeaderMap,
     body: Body,
     limit: usize,
     time: Duration,
     share: &BodyShare,
 ) -> Result<BudgetedBody, Problem> {
-    timeout(time, collect(body, limit, share)).await.unwrap_or_else(|_| {
+    let coding = Coding::of(headers)?;
+    timeout(time, collect(coding, body, limit, share)).await.unwrap_or_else(|_| {
         let detail = format!("the body was not complete within {} s", time.as_secs());
         Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout", detail))
     })
 }
 
-async fn collect(body: Body, limit: usize, share: &BodyShare) -> Result<BudgetedBody, Problem> {
+async fn collect(
+    coding: Coding,
+    body: Body,
+    limit: usize,
+    share: &BodyShare,
+) -> Result<BudgetedBody, Problem> {
     let mut read = BudgetedBody { bytes: Vec::new(), reserved: ReservedBytes::default() };
-    let mut frames = body.into_data_stream();
+    // What the decoder itself keeps of the decoded bytes.
+    let mut window = ReservedBytes::default();
+    let mut frames = coding.decode(body, limit);
     while let Some(frame) = frames.next().await {
-        let frame = frame.map_err(|error| {
-            let detail = format!("the body was not received completely: {error}");
-            Problem::new(StatusCode::BAD_REQUEST, "malformed", "Malformed body", detail)
-        })?;
+        let frame = frame.map_err(|error| incomplete(&error, coding, limit))?;
         if read.bytes.len() + frame.len() > limit {
-            let detail = format!("the body is longer than {limit} bytes");
-            return Err(Problem::new(
-                StatusCode::PAYLOAD_TOO_LARGE,
-                "too-large",
-                "Content too large",
-                detail,
-            ));
+            return Err(too_large(coding, limit));
         }
+        let kept = coding.window().saturating_sub(read.bytes.len()).min(frame.len());
+        window.add(kept, share)?;
         read.reserved.add(frame.len(), share)?;
         read.bytes.extend_from_slice(&frame);
     }
     Ok(read)
+}
+
+fn incomplete(error: &io::Error, coding: Coding, limit: usize) -> Problem {
+    if error.kind() == io::ErrorKind::FileTooLarge {
+        return too_large(Coding::Identity, limit);
+    }
+    let detail = match coding {
+        Coding::Identity => format!("the body was not received completely: {error}"),
+        Coding::Gzip | Coding::Zstd => {
+            format!("the body was not received completely, or cannot be decompressed: {error}")
+        }
+    };
+    Problem::new(StatusCode::BAD_REQUEST, "malformed", "Malformed body", detail)
+}
+
+fn too_large(coding: Coding, limit: usize) -> Problem {
+    let decoded = if coding == Coding::Identity { "" } else { ", decompressed" };
+    let detail = format!("the body is longer than {limit} bytes{decoded}");
+    Problem::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
 }
 
 impl AsRef<[u8]> for BudgetedBody {

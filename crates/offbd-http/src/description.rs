@@ -6,8 +6,8 @@
 //! items instead of repeating them.
 
 use axum::http::StatusCode;
-use utoipa::openapi::path::Operation;
-use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, Schema};
+use utoipa::openapi::path::{Operation, Parameter};
+use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, ObjectBuilder, Schema, Type};
 use utoipa::openapi::{Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Response};
 
 use super::routes::operations_mut;
@@ -58,6 +58,7 @@ const WITH_BODY: [SharedResponse; 3] = [
 pub(super) fn complete(mut document: Document) -> Document {
     for operation in document.paths.paths.values_mut().flat_map(operations_mut) {
         add_responses(operation);
+        operation.parameters.iter_mut().flatten().for_each(describe_if_match);
         for (code, response) in &mut operation.responses.responses {
             if let RefOr::T(response) = response {
                 complete_response(code, response);
@@ -152,6 +153,9 @@ fn rename(schema: &mut RefOr<Schema>) {
     }
 }
 
+/// The values of `If-Match`: any edition, or entity tags (RFC 9110, section 13.1.1).
+const IF_MATCH: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
+
 /// How the name of a page of items begins in the program.
 const PAGE: &str = "Page_";
 
@@ -179,6 +183,16 @@ fn add_responses(operation: &mut Operation) {
     for (status, name, _) in sets.flatten() {
         let shared = || Ref::from_response_name(*name).into();
         operation.responses.responses.entry(status.as_str().to_owned()).or_insert_with(shared);
+    }
+}
+
+/// Describes the values of `If-Match`; in a header there is no null.
+fn describe_if_match(parameter: &mut RefOr<Parameter>) {
+    if let RefOr::T(parameter) = parameter
+        && parameter.name == "If-Match"
+    {
+        let schema = ObjectBuilder::new().schema_type(Type::String).pattern(Some(IF_MATCH));
+        parameter.schema = Some(schema.build().into());
     }
 }
 

@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::http::header::{CONNECTION, HOST, TRANSFER_ENCODING, UPGRADE};
+use axum::http::header::{
+    CONNECTION, CONTENT_ENCODING, CONTENT_LENGTH, HOST, TRANSFER_ENCODING, UPGRADE,
+};
 use axum::http::request::Parts;
 use axum::http::uri::{PathAndQuery, Uri};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode};
@@ -21,6 +23,7 @@ use sha2::{Digest, Sha256};
 
 use super::Problem;
 use super::assets::MAX_ASSET_BYTES;
+use super::coding::Coding;
 use super::credential::client_address;
 use offbd_service::{Route, Service, ServiceError};
 
@@ -112,7 +115,11 @@ pub(super) async fn name_in_body(request: Request) -> Result<(Option<String>, Re
     struct Named {
         name: String,
     }
-    let (parts, body) = request.into_parts();
+    let (mut parts, body) = request.into_parts();
+    let decoded = Coding::of(&parts.headers)?.decode(body, MAX_ASSET_BYTES);
+    let body = Body::from_stream(decoded);
+    parts.headers.remove(CONTENT_ENCODING);
+    parts.headers.remove(CONTENT_LENGTH);
     let bytes = axum::body::to_bytes(body, MAX_ASSET_BYTES).await.map_err(|_| {
         let detail = "the asset file is too long, or the request ended early";
         Problem::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
@@ -224,7 +231,7 @@ fn address_to(parts: &mut Parts, address: &str, secret: &str) -> Result<(), Prob
     parts.uri = uri;
     parts.version = axum::http::Version::HTTP_11;
     if parts.method == Method::HEAD {
-        parts.headers.remove(axum::http::header::CONTENT_LENGTH);
+        parts.headers.remove(CONTENT_LENGTH);
     }
     Ok(())
 }

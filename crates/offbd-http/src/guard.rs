@@ -59,13 +59,13 @@ pub(super) struct Guard {
 
 /// The response to a denied request, with an additional header.
 struct Denial {
-    problem: Problem,
+    problem: Box<Problem>,
     header: Option<Box<(HeaderName, HeaderValue)>>,
 }
 
 impl From<Problem> for Denial {
     fn from(problem: Problem) -> Self {
-        Self { problem, header: None }
+        Self { problem: Box::new(problem), header: None }
     }
 }
 
@@ -293,7 +293,7 @@ impl Guard {
         let scope =
             HeaderValue::from_static("Bearer realm=\"offbd\", error=\"insufficient_scope\"");
         Err(Denial {
-            problem: forbidden(detail),
+            problem: Box::new(forbidden(detail)),
             header: Some(Box::new((WWW_AUTHENTICATE, scope))),
         })
     }
@@ -352,7 +352,7 @@ fn rule(
         let allowed: Vec<_> = methods.iter().map(|(method, _)| method.as_str()).collect();
         let header = HeaderValue::from_str(&allowed.join(",")).ok();
         let header = header.map(|value| Box::new((ALLOW, value)));
-        Denial { problem: problem::not_allowed(method, uri), header }
+        Denial { problem: Box::new(problem::not_allowed(method, uri)), header }
     })
 }
 
@@ -405,6 +405,7 @@ fn unauthenticated(detail: &str, error: Option<&str>) -> Denial {
     let problem = Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", "Unauthorized", detail);
     let error = error.map(|error| format!(", error=\"{error}\"")).unwrap_or_default();
     let challenge = HeaderValue::from_str(&format!("Bearer realm=\"offbd\"{error}")).ok();
+    let problem = Box::new(problem);
     Denial { problem, header: challenge.map(|challenge| Box::new((WWW_AUTHENTICATE, challenge))) }
 }
 
@@ -413,6 +414,7 @@ fn rate_limited(wait: Duration) -> Denial {
     let detail = format!("too many requests; retry after {seconds} s");
     let title = "Rate limit exceeded";
     let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", title, detail);
+    let problem = Box::new(problem);
     Denial { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
 }
 

@@ -6,9 +6,9 @@ use std::time::Duration;
 use axum::extract::Request;
 use axum::http::Method;
 use axum::http::header::{
-    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HeaderName,
-    HeaderValue, LOCATION, REFERRER_POLICY, RETRY_AFTER, STRICT_TRANSPORT_SECURITY,
-    WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
+    ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
+    ETAG, HeaderName, HeaderValue, IF_MATCH, LOCATION, REFERRER_POLICY, RETRY_AFTER,
+    STRICT_TRANSPORT_SECURITY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::middleware::Next;
 use axum::response::Response;
@@ -68,10 +68,13 @@ pub(super) fn cors(origins: &[String]) -> CorsLayer {
         .allow_headers([
             ACCEPT,
             AUTHORIZATION,
+            CONTENT_ENCODING,
             CONTENT_TYPE,
+            IF_MATCH,
             HeaderName::from_static("last-event-id"),
         ])
         .expose_headers([
+            ETAG,
             LOCATION,
             RETRY_AFTER,
             WWW_AUTHENTICATE,

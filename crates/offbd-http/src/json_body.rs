@@ -37,7 +37,7 @@ pub(super) async fn read(
     limit: usize,
 ) -> Result<Vec<u8>, Problem> {
     let timeout = app.service.limits().requests.body_timeout();
-    let bytes = body::read(body, limit, timeout, &app.budget.whole()).await?.bytes;
+    let bytes = body::read(headers, body, limit, timeout, &app.budget.whole()).await?.bytes;
     check_media_type(headers, &bytes)?;
     Ok(bytes)
 }

@@ -7,6 +7,7 @@ use axum::http::header::LOCATION;
 use axum::response::IntoResponse;
 use serde::Deserialize;
 
+use super::edition::{IfMatch, Tagged, with_tag};
 use super::json_body::JsonBody;
 use super::{App, Path, Problem, Query, page_limit, query_word};
 use offbd_core::vocabulary::Invalid;
@@ -54,42 +55,50 @@ pub(super) async fn create_channel(
 /// Returns a channel, without its secrets.
 #[utoipa::path(get, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "get_channel", params(("channel" = String, description = "Id of the channel")),
-    responses((status = 200, body = ChannelView), (status = 404, body = Problem)))]
+    responses((status = 200, body = ChannelView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 404, body = Problem)))]
 pub(super) async fn channel(
     State(service): State<Service>,
     Path(channel): Path<String>,
-) -> Result<Json<ChannelView>, Problem> {
-    Ok(Json(service.channel(&channel).await?))
+) -> Result<Tagged<ChannelView>, Problem> {
+    let channel = service.channel(&channel).await?;
+    Ok(with_tag(channel.etag.clone(), channel))
 }
 
 /// Replaces the settings of a channel. A secret or password that is not given stays.
 #[utoipa::path(put, path = "/notifications/channels/{channel}", tag = "notifications",
-    operation_id = "put_channel", params(("channel" = String, description = "Id of the channel")),
+    operation_id = "put_channel", params(("channel" = String, description = "Id of the channel"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
     request_body = NewChannelView,
-    responses((status = 200, body = MadeChannelView), (status = 400, body = Problem),
-        (status = 404, body = Problem),
+    responses((status = 200, body = MadeChannelView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "The name is taken"),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
         (status = 422, body = Problem)))]
 pub(super) async fn put_channel(
     State(app): State<App>,
     Path(channel): Path<String>,
+    IfMatch(expected): IfMatch,
     body: JsonBody<Option<NewChannelView>>,
-) -> Result<Json<MadeChannelView>, Problem> {
-    let new = given(body)?;
-    Ok(Json(app.service.put_channel(&channel, new).await?))
+) -> Result<Tagged<MadeChannelView>, Problem> {
+    let made = app.service.put_channel(&channel, given(body)?, &expected).await?;
+    Ok(with_tag(made.channel.etag.clone(), made))
 }
 
 /// Deletes a channel with its deliveries.
 #[utoipa::path(delete, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "delete_channel",
-    params(("channel" = String, description = "Id of the channel")),
+    params(("channel" = String, description = "Id of the channel"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
     responses((status = 204), (status = 404, body = Problem),
-        (status = 409, body = Problem, description = "A rule uses it")))]
+        (status = 409, body = Problem, description = "A rule uses it"),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
 pub(super) async fn delete_channel(
     State(service): State<Service>,
     Path(channel): Path<String>,
+    IfMatch(expected): IfMatch,
 ) -> Result<StatusCode, Problem> {
-    service.delete_channel(&channel).await?;
+    service.delete_channel(&channel, &expected).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -130,30 +139,50 @@ pub(super) async fn create_rule(
     Ok((StatusCode::CREATED, [(LOCATION, location)], Json(rule)))
 }
 
+/// Returns a rule.
+#[utoipa::path(get, path = "/notifications/rules/{rule}", tag = "notifications",
+    operation_id = "get_rule", params(("rule" = String, description = "Id of the rule")),
+    responses((status = 200, body = RuleView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 404, body = Problem)))]
+pub(super) async fn rule(
+    State(service): State<Service>,
+    Path(rule): Path<String>,
+) -> Result<Tagged<RuleView>, Problem> {
+    let rule = service.rule(&rule).await?;
+    Ok(with_tag(rule.etag.clone(), rule))
+}
+
 /// Replaces a rule.
 #[utoipa::path(put, path = "/notifications/rules/{rule}", tag = "notifications",
-    operation_id = "put_rule", params(("rule" = String, description = "Id of the rule")),
+    operation_id = "put_rule", params(("rule" = String, description = "Id of the rule"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
     request_body = NewRuleView,
-    responses((status = 200, body = RuleView), (status = 400, body = Problem),
-        (status = 404, body = Problem), (status = 422, body = Problem)))]
+    responses((status = 200, body = RuleView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 400, body = Problem), (status = 404, body = Problem),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
+        (status = 422, body = Problem)))]
 pub(super) async fn put_rule(
     State(app): State<App>,
     Path(rule): Path<String>,
+    IfMatch(expected): IfMatch,
     body: JsonBody<Option<NewRuleView>>,
-) -> Result<Json<RuleView>, Problem> {
-    let new = given(body)?;
-    Ok(Json(app.service.put_rule(&rule, new).await?))
+) -> Result<Tagged<RuleView>, Problem> {
+    let rule = app.service.put_rule(&rule, given(body)?, &expected).await?;
+    Ok(with_tag(rule.etag.clone(), rule))
 }
 
 /// Deletes a rule, with its reminders.
 #[utoipa::path(delete, path = "/notifications/rules/{rule}", tag = "notifications",
-    operation_id = "delete_rule", params(("rule" = String, description = "Id of the rule")),
-    responses((status = 204), (status = 404, body = Problem)))]
+    operation_id = "delete_rule", params(("rule" = String, description = "Id of the rule"),
+        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+    responses((status = 204), (status = 404, body = Problem),
+        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
 pub(super) async fn delete_rule(
     State(service): State<Service>,
     Path(rule): Path<String>,
+    IfMatch(expected): IfMatch,
 ) -> Result<StatusCode, Problem> {
-    service.delete_rule(&rule).await?;
+    service.delete_rule(&rule, &expected).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

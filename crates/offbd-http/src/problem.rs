@@ -2,15 +2,18 @@
 //! its status.
 
 use axum::extract::rejection::{PathRejection, QueryRejection};
-use axum::http::header::{CONTENT_TYPE, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE};
+use axum::http::header::{
+    ACCEPT_ENCODING, CONTENT_TYPE, ETAG, HeaderValue, RETRY_AFTER, WWW_AUTHENTICATE,
+};
 use axum::http::{Method, StatusCode, Uri};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use super::coding::{ACCEPTED_CODINGS, UNKNOWN_CODING};
 use super::retry::retry_after_s;
 use offbd_core::vocabulary::Invalid;
-use offbd_service::{RETRY_AFTER_S, ServiceError};
+use offbd_service::{EntityTag, RETRY_AFTER_S, ServiceError};
 use offbd_wire::PROBLEM_TYPE;
 use offbd_wire::sovd::SovdErrorView;
 use offbd_wire::telemetry::BatchError;
@@ -33,6 +36,10 @@ pub struct Problem {
     /// Name of the invalid query parameter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parameter: Option<Box<str>>,
+    /// The present entity tag of what the request was to replace, in quotes, for `If-Match`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<String>)]
+    pub etag: Option<Box<EntityTag>>,
     /// Id of the request, as in `x-request-id` and in the log.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instance: Option<Box<str>>,
@@ -60,6 +67,7 @@ impl Problem {
             detail: detail.into().into(),
             pointer: None,
             parameter: None,
+            etag: None,
             instance: None,
             sovd: None,
             retry_after_s: RETRY_AFTER_S as u32,
@@ -106,6 +114,14 @@ impl IntoResponse for Problem {
         if status == StatusCode::UNAUTHORIZED {
             headers.insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"offbd\""));
         }
+        if let Some(etag) = self.etag.as_ref().and_then(|tag| tag.to_string().parse().ok()) {
+            headers.insert(ETAG, etag);
+        }
+        // Only then: with the header a 415 speaks of the coding, not of the media type
+        // (RFC 9110, section 12.5.3).
+        if self.kind.ends_with(UNKNOWN_CODING) {
+            headers.insert(ACCEPT_ENCODING, HeaderValue::from_static(ACCEPTED_CODINGS));
+        }
         response.extensions_mut().insert(self);
         response
     }
@@ -145,6 +161,13 @@ impl From<ServiceError> for Problem {
             E::NotDone { .. } => conflict("not-done", "Calibration not done"),
             E::NothingOffered { .. } => conflict("nothing-offered", "No calibration offered"),
             E::AlreadyLearnt { .. } => conflict("already-learnt", "Rig already calibrated"),
+            E::Changed { now } => {
+                let etag = now.map(Box::new);
+                Self {
+                    etag,
+                    ..new(StatusCode::PRECONDITION_FAILED, "changed", "Changed meanwhile")
+                }
+            }
             E::Invalid(invalid) => Self::from(invalid),
             E::Batch(batch) => Self::from(batch),
             E::TooMany { .. } => {

@@ -153,7 +153,8 @@ pub(super) async fn open(
 /// telemetry. The asset's open session is ended first, and the new session is ended after
 /// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
 /// others wait. Of a file that is damaged, ends too early or expands too far, or if the
-/// connection is closed before the response, nothing is kept.
+/// connection is closed before the response, nothing is kept. The request may be compressed, with
+/// `Content-Encoding: gzip` or `zstd`; the limit is for what it expands to.
 #[utoipa::path(post, path = "/assets/{asset}/sessions/import", tag = "sessions",
     operation_id = "import_session",
     params(("asset" = String, description = "Name of the asset"), ImportQuery),
@@ -185,7 +186,7 @@ pub(super) async fn import(
     };
     let limits = &app.service.limits().requests;
     let timeout = limits.body_timeout() * IMPORT_TIMEOUT_FACTOR;
-    let read = body::read(body, limits.import_bytes, timeout, &share).await?;
+    let read = body::read(&headers, body, limits.import_bytes, timeout, &share).await?;
     let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
     if is_dry_run {
         return Ok(Json(app.service.inspect(file, options).await?).into_response());

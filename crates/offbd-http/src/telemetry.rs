@@ -37,6 +37,9 @@ pub(super) struct SessionQuery {
 /// again with the same values is counted as a duplicate and ignored, so that a batch can be
 /// retried safely; with other values it is rejected as a conflict.
 ///
+/// The body may be compressed, with `Content-Encoding: gzip` or `zstd`; the limits are for what it
+/// expands to.
+///
 /// Without a session name the samples are added to the asset's open session, or to a new
 /// one: two conflicting samples in a row, or two whose clock has gone back by more than
 /// 10 s to times that are no gap of the recording, show that the device has restarted, and
@@ -58,7 +61,7 @@ pub(super) struct SessionQuery {
         (status = 408, body = Problem, description = "The body was not received in time"),
         (status = 409, body = Problem, description = "The session has ended"),
         (status = 413, body = Problem, description = "The batch is too long"),
-        (status = 415, body = Problem, description = "Unsupported format"),
+        (status = 415, body = Problem, description = "Unsupported format or content coding"),
         (status = 422, body = Problem, description = "Invalid session name"),
         (status = 429, body = Problem, description = "Too many requests; see `Retry-After`"),
         (status = 503, body = Problem,
@@ -73,7 +76,8 @@ pub(super) async fn post(
 ) -> Result<Json<AckView>, Problem> {
     let format = format(&headers)?;
     let limits = &app.service.limits().requests;
-    let read = body::read(body, limits.batch_bytes, limits.body_timeout(), &share).await?;
+    let read = body::read(&headers, body, limits.batch_bytes, limits.body_timeout(), &share);
+    let read = read.await?;
     let mut batch = format.parse(&read.bytes, limits.batch_samples)?;
     drop(read);
     batch.session = session_name(batch.session, query.session)?;

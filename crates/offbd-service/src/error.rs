@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc::error::TrySendError;
 
+use super::EntityTag;
 use offbd_core::engine::NoDriveCycle;
 use offbd_core::vocabulary::{Invalid, UnknownWord};
 use offbd_store::StoreError;
@@ -69,6 +70,9 @@ pub enum ServiceError {
          again"
     )]
     AlreadyLearnt { asset: String },
+    /// The request is for an earlier edition of what it replaces. `now` is the present one.
+    #[error("{}", changed(now.as_ref()))]
+    Changed { now: Option<EntityTag> },
     #[error(transparent)]
     Invalid(#[from] Invalid),
     #[error(transparent)]
@@ -106,6 +110,16 @@ pub enum ServiceError {
     Store(Arc<StoreError>),
     #[error("the store contains data that this version cannot read: {what}")]
     Corrupt { what: String },
+}
+
+fn changed(now: Option<&EntityTag>) -> String {
+    match now {
+        Some(now) => format!(
+            "somebody has changed it since it was read; its entity tag is now {now}: read it \
+             again, and send the change with this tag in `If-Match`"
+        ),
+        None => "it does not exist, or no longer; a request with `If-Match` creates nothing".into(),
+    }
 }
 
 impl ServiceError {

@@ -49,6 +49,7 @@
 //! - `communication`: finds rigs whose data stay away.
 //! - `mutes`: the monitors that a person has muted.
 //! - `tags`: what is permitted as a tag of a rig.
+//! - `edition`: entity tags, and changes that depend on them.
 //! - `upkeep`: deletion in parts, retention, the watchdog of ingest.
 //! - `background`: long computations on threads of a low priority.
 //! - `simulation_tests`: the whole service without threads, with devices and faults.
@@ -64,6 +65,7 @@ mod background;
 mod clock;
 mod cluster;
 mod communication;
+mod edition;
 mod error;
 mod job;
 mod jobs;
@@ -90,6 +92,7 @@ pub use offbd_store::RecordingReader;
 pub use clock::{Clock, parse_timestamp};
 pub use cluster::Route;
 pub use communication::CommunicationSettings;
+pub use edition::{Edition, EntityTag, Expected};
 pub use error::ServiceError;
 pub use limits::{Limits, OutOfRange, RETRY_AFTER_S, RequestLimits, Retention, WorkerLimits};
 pub use notifications::settings::key as webhook_key;

@@ -27,6 +27,7 @@ mod backup;
 mod check;
 mod checkpoint;
 pub mod codec;
+mod condition;
 mod execute;
 mod expiry;
 mod file;
@@ -69,6 +70,7 @@ pub use alarm::{AlarmWrite, CommunicationChange, CommunicationRow, MuteRow, Note
 pub use asset_record::{AssetRecord, EndedSessionRow, MAX_ASSETS_AT_ONCE, MAX_ENDED_SESSIONS};
 pub use backup::{back_up, restore};
 pub use check::{CheckReport, check};
+pub use condition::{ConditionalWrite, EditWrite, Expectation, Refusal};
 pub use expiry::SessionSize;
 pub use file::private_file;
 pub use location::Location;

@@ -28,6 +28,14 @@ pub(super) async fn put(
     Ok(())
 }
 
+/// The tags of an asset, in alphabetical order, as the writer sees them.
+pub(super) async fn of(db: &mut AnyConnection, asset: &str) -> Result<Vec<String>, StoreError> {
+    let tags = sqlx::query_scalar("SELECT name FROM tag WHERE asset = $1").bind(asset);
+    let mut tags: Vec<String> = tags.fetch_all(db).await?;
+    tags.sort();
+    Ok(tags)
+}
+
 impl QueryBuilder {
     /// Appends the condition that the asset named in `column` has a tag; nothing without one.
     /// `column` is constant SQL.

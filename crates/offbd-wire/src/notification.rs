@@ -78,6 +78,8 @@ impl fmt::Debug for NewEmailView {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ChannelView {
     pub id: String,
+    /// Entity tag of name and settings, for `If-Match`.
+    pub etag: String,
     pub name: String,
     pub kind: ChannelKind,
     /// URL of a webhook; null for e-mail.
@@ -204,6 +206,8 @@ const fn yes() -> bool {
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct RuleView {
     pub id: String,
+    /// Entity tag of the rule, for `If-Match`.
+    pub etag: String,
     /// Name of the channel.
     pub channel_name: String,
     /// Time of creation, RFC 3339.

@@ -45,14 +45,14 @@ export const alarmApi = {
     send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
   channels: async () => (await get<Page<Channel>>(CHANNELS)).items,
   createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
-  putChannel: (id: string, channel: NewChannel) =>
-    send<Schemas["MadeChannel"]>("PUT", `${CHANNELS}/${segment(id)}`, channel),
-  deleteChannel: (id: string) => send("DELETE", `${CHANNELS}/${segment(id)}`),
+  putChannel: ({ id, etag }: Channel, channel: NewChannel) =>
+    send<Schemas["MadeChannel"]>("PUT", `${CHANNELS}/${segment(id)}`, channel, etag),
+  deleteChannel: ({ id, etag }: Channel) => send("DELETE", `${CHANNELS}/${segment(id)}`, undefined, etag),
   testChannel: (id: string) => send<Delivery>("POST", `${CHANNELS}/${segment(id)}/test`),
   rules: async () => (await get<Page<Rule>>(RULES)).items,
   createRule: (rule: NewRule) => send<Rule>("POST", RULES, rule),
-  putRule: (id: string, rule: NewRule) => send<Rule>("PUT", `${RULES}/${segment(id)}`, rule),
-  deleteRule: (id: string) => send("DELETE", `${RULES}/${segment(id)}`),
+  putRule: ({ id, etag }: Rule, rule: NewRule) => send<Rule>("PUT", `${RULES}/${segment(id)}`, rule, etag),
+  deleteRule: ({ id, etag }: Rule) => send("DELETE", `${RULES}/${segment(id)}`, undefined, etag),
   deliveries: (state?: DeliveryState) =>
     get<Page<Delivery>>(`/notifications/deliveries${query({ state, limit: 100 })}`),
 };

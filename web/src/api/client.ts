@@ -1,7 +1,7 @@
 /** The requests of the page to the service. */
 import { actor, withCredentials } from "./access";
 import { FORMATS, type FormatName } from "./formats";
-import { BASE, failure, get, getAll, LOGIN, query, request, segment, send } from "./request";
+import { BASE, editionOf, failure, get, getAll, LOGIN, query, request, segment, send } from "./request";
 import type {
   Asset,
   CalibrationJob,
@@ -39,6 +39,9 @@ import type {
   Trial,
 } from "./types";
 
+/** The path of a fault of a rig. */
+const faultPath = (name: string, code: FaultCode) => `/assets/${segment(name)}/faults/${segment(code)}`;
+
 /** Sends a recording to be imported; its first bytes tell the format. */
 const sendFile = <T>(
   asset: string,
@@ -66,7 +69,8 @@ export const api = {
   fleet: () => getAll<FleetEntry>("/fleet", {}),
   asset: (name: string) => get<Asset>(`/assets/${segment(name)}`),
   createAsset: (asset: Partial<Asset>) => send<Asset>("POST", "/assets", asset),
-  putAsset: (asset: Asset) => send<Asset>("PUT", `/assets/${segment(asset.name)}`, asset),
+  putAsset: (asset: Asset, before: Asset) =>
+    send<Asset>("PUT", `/assets/${segment(asset.name)}`, asset, editionOf(before)),
   deleteAsset: (name: string) => send<void>("DELETE", `/assets/${segment(name)}`),
   state: (name: string) => get<State>(`/assets/${segment(name)}/state`),
   link: (name: string) => get<RigLink>(`/assets/${segment(name)}/link`),
@@ -74,22 +78,16 @@ export const api = {
   trends: (name: string) => get<Trends>(`/assets/${segment(name)}/trends`),
   faultsOf: (name: string, status: FaultFilter = "all") =>
     get<Page<FaultEntry>>(`/assets/${segment(name)}/faults${query({ status })}`).then((page) => page.items),
-  fault: (name: string, code: FaultCode) =>
-    get<FaultEntry>(`/assets/${segment(name)}/faults/${segment(code)}`),
+  fault: (name: string, code: FaultCode) => get<FaultEntry>(faultPath(name, code)),
   /** The recorded and judged seconds around the last occurrence. */
   faultRecording: (name: string, code: FaultCode, range: { before_s: number; after_s: number }) =>
-    get<FaultRecording>(`/assets/${segment(name)}/faults/${segment(code)}/recording${query(range)}`),
+    get<FaultRecording>(`${faultPath(name, code)}/recording${query(range)}`),
   history: (name: string, code: FaultCode) =>
-    get<Page<HistoryEntry>>(
-      `/assets/${segment(name)}/faults/${segment(code)}/history${query({ limit: 200 })}`,
-    ),
+    get<Page<HistoryEntry>>(`${faultPath(name, code)}/history${query({ limit: 200 })}`),
   acknowledge: (name: string, code: FaultCode) =>
-    send<FaultEntry>(
-      "POST",
-      `/assets/${segment(name)}/faults/${segment(code)}/acknowledge${query({ by: actor() })}`,
-    ),
+    send<FaultEntry>("POST", `${faultPath(name, code)}/acknowledge${query({ by: actor() })}`),
   clear: (name: string, code: FaultCode) =>
-    send<void>("DELETE", `/assets/${segment(name)}/faults/${segment(code)}${query({ by: actor() })}`),
+    send<void>("DELETE", `${faultPath(name, code)}${query({ by: actor() })}`),
   sessions: (values: SessionQuery) => get<Page<Session>>(`/sessions${query(values)}`),
   session: (session: string) => get<Session>(`/sessions/${segment(session)}`),
   /** The calibration that a session is judged with. */

@@ -46,23 +46,35 @@ export function errorText(error: unknown): string {
   return words || (error instanceof Error ? error.message : String(error));
 }
 
+/** The entity tags of what was fetched: they name the edition that a change replaces. */
+const editions = new WeakMap<object, string>();
+
+/** Returns the entity tag of a fetched resource, if its response had one. */
+export const editionOf = (fetched: object) => editions.get(fetched);
+
 export async function request<T>(path: string, init: RequestInit = {}): Promise<T> {
   const signal = init.signal ?? AbortSignal.timeout(TIMEOUT_MS);
   const response = await fetch(path, withCredentials({ ...init, signal }));
   if (response.status === 401 && path !== LOGIN) announceUnauthenticated();
   if (!response.ok) throw await failure(response);
   const isJson = response.headers.get("content-type")?.includes("json");
-  return (isJson ? await response.json() : undefined) as T;
+  const value: unknown = isJson ? await response.json() : undefined;
+  const etag = response.headers.get("etag");
+  if (etag && value && typeof value === "object") editions.set(value, etag);
+  return value as T;
 }
 
 export const get = <T>(path: string) => request<T>(BASE + path);
 
-export const send = <T>(method: string, path: string, body?: unknown) =>
+/** Sends a change; with `edition`, the service refuses it if another edition is there by now. */
+export const send = <T>(method: string, path: string, body?: unknown, edition?: string) =>
   request<T>(BASE + path, {
     method,
-    ...(body === undefined
-      ? {}
-      : { body: JSON.stringify(body), headers: { "content-type": "application/json" } }),
+    ...(body === undefined ? {} : { body: JSON.stringify(body) }),
+    headers: {
+      ...(body === undefined ? {} : { "content-type": "application/json" }),
+      ...(edition ? { "if-match": edition } : {}),
+    },
   });
 
 type QueryValues = Record<string, string | number | boolean | null | undefined>;

@@ -1,13 +1,15 @@
 /** The requests about the tags of rigs. */
-import { get, getAll, segment, send } from "./request";
+import { editionOf, get, getAll, segment, send } from "./request";
 import type { components } from "../../generated/schema";
 import type { TagUse } from "./types";
 
-type Tags = components["schemas"]["Tags"];
+export type Tags = components["schemas"]["Tags"];
 
 export const tagApi = {
   /** The tags in use, in alphabetical order. */
   inUse: () => getAll<TagUse>("/tags", {}).then((uses) => uses.map(({ tag }) => tag)),
-  of: (asset: string) => get<Tags>(`/assets/${segment(asset)}/tags`).then(({ tags }) => tags),
-  put: (asset: string, tags: string[]) => send<Tags>("PUT", `/assets/${segment(asset)}/tags`, { tags }),
+  of: (asset: string) => get<Tags>(`/assets/${segment(asset)}/tags`),
+  /** Replaces the tags `before`, as they were fetched. */
+  put: (asset: string, tags: string[], before: Tags) =>
+    send<Tags>("PUT", `/assets/${segment(asset)}/tags`, { tags }, editionOf(before)),
 };

@@ -6,6 +6,9 @@ const PREFIX = "urn:offbd:problem:";
 const WORDS: Record<string, string> = {
   "asset-exists":
     "There is a rig of this name already. Choose another name, or open that rig and change it in its set-up.",
+  changed:
+    "Somebody has changed this since the page showed it, so nothing was saved. Reload the page to see the change, " +
+    "then make yours again.",
   "unknown-asset": "There is no rig of this name. Register it under Set up first.",
   "nothing-offered":
     "No calibration waits for an answer. It was answered before, or the rig must move more first.",

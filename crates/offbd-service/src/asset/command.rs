@@ -4,7 +4,7 @@ use tokio::sync::{OwnedSemaphorePermit, oneshot};
 use tracing::Span;
 
 use super::actor::Asset;
-use crate::ServiceError;
+use crate::{Expected, ServiceError};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::FaultCode;
 use offbd_store::CalibrationRow;
@@ -19,9 +19,9 @@ pub(crate) enum AssetCommand {
     /// Registers the asset with this asset file.
     Create { document: String, reply: Reply<()> },
     /// Replaces the asset file. An open session keeps the one that it started with.
-    Replace { rig: Box<Rig>, reply: Reply<()> },
+    Replace { rig: Box<Rig>, expected: Expected, reply: Reply<()> },
     /// Hides the asset and revokes the tokens of its devices.
-    Delete { reply: Reply<()> },
+    Delete { expected: Expected, reply: Reply<()> },
 
     /// Evaluates and records a batch. `importing` is set for a recording that is being
     /// imported; `request` is the tracing span of the request.

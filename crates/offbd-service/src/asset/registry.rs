@@ -2,14 +2,26 @@
 
 use super::actor::Asset;
 use super::turn::Turn;
-use crate::{ServiceError, views};
+use crate::{EntityTag, Expected, ServiceError, views};
 use offbd_core::engine::Rig;
 use offbd_store::{AccessWrite, Write};
-use offbd_wire::asset;
+use offbd_wire::asset::{self, AssetView};
 
 impl Asset {
-    /// Replaces the asset file by that of `rig`.
-    pub(super) fn replace(&mut self, rig: Rig, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+    /// Checks that a request may replace the asset file.
+    fn check_edition(&self, expected: &Expected) -> Result<(), ServiceError> {
+        let file: AssetView = views::from_json(&self.row.document)?;
+        expected.check(Some(&EntityTag::of(&file)?))
+    }
+
+    /// Replaces the asset file by that of `rig` if it is the expected one.
+    pub(super) fn replace(
+        &mut self,
+        rig: Rig,
+        expected: &Expected,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        self.check_edition(expected)?;
         self.write_file(views::to_json(&asset::view(&rig))?, turn);
         if self.rig.calibration != rig.calibration {
             // The calibration in the file is not one of the stored calibration jobs.
@@ -25,8 +37,13 @@ impl Asset {
     }
 
     /// Hides the asset, whose data are deleted later, and revokes the tokens of its
-    /// devices.
-    pub(super) fn delete(&mut self, turn: &mut Turn<'_>) -> Result<(), ServiceError> {
+    /// devices, if its file is the expected one.
+    pub(super) fn delete(
+        &mut self,
+        expected: &Expected,
+        turn: &mut Turn<'_>,
+    ) -> Result<(), ServiceError> {
+        self.check_edition(expected)?;
         self.deleted = true;
         let name = self.row.name.clone();
         let revoke = AccessWrite::RevokeDevices { asset: name.clone(), at: turn.at };

@@ -268,10 +268,12 @@ impl Shard {
         use AssetCommand as C;
         match command {
             C::Create { document, reply } => self.create(name, asset, document, reply),
-            C::Replace { rig, reply } => {
-                self.change(name, asset, reply, |a, turn| a.replace(*rig, turn));
+            C::Replace { rig, expected, reply } => {
+                self.change(name, asset, reply, |a, turn| a.replace(*rig, &expected, turn));
             }
-            C::Delete { reply } => self.change(name, asset, reply, |a, turn| a.delete(turn)),
+            C::Delete { expected, reply } => {
+                self.change(name, asset, reply, |a, turn| a.delete(&expected, turn));
+            }
             C::Ingest { batch, importing, request, reply } => {
                 let _span = tracing::debug_span!(parent: &request, "judge").entered();
                 self.change(name, asset, reply, |a, turn| a.ingest(batch, importing, turn));

@@ -1,7 +1,7 @@
 //! The registry of assets.
 
 use crate::asset::{self, Asset, AssetCommand};
-use crate::{Service, ServiceError, views};
+use crate::{Edition, Expected, Service, ServiceError, views};
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::Invalid;
 use offbd_store::AssetFilter;
@@ -18,6 +18,14 @@ impl Service {
         let row = self.inner.handles.store.asset(name).await?;
         let row = row.ok_or_else(|| ServiceError::UnknownAsset { name: name.to_owned() })?;
         views::from_json(&row.document)
+    }
+
+    /// Returns the asset file of `name` with the tag of its edition.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownAsset`].
+    pub async fn asset_edition(&self, name: &str) -> Result<Edition<AssetView>, ServiceError> {
+        Edition::of(self.asset(name).await?)
     }
 
     /// Checks that there is an asset `name`, without reading its file.
@@ -63,10 +71,10 @@ impl Service {
     /// # Errors
     /// [`ServiceError::Invalid`] with the invalid element of the asset file;
     /// [`ServiceError::AssetExists`]; [`ServiceError::RegistryFull`].
-    pub async fn create_asset(&self, document: &[u8]) -> Result<AssetView, ServiceError> {
+    pub async fn create_asset(&self, document: &[u8]) -> Result<Edition<AssetView>, ServiceError> {
         let rig = asset_file::parse_new(document)?;
         self.create(&rig).await?;
-        Ok(asset_file::view(&rig))
+        Edition::of(asset_file::view(&rig))
     }
 
     async fn create(&self, rig: &Rig) -> Result<(), ServiceError> {
@@ -81,24 +89,29 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::Invalid`] with the invalid element, `/name` if it differs from
-    /// `name`.
+    /// `name`; [`ServiceError::Changed`] if the present file is not the expected one.
     pub async fn put_asset(
         &self,
         name: &str,
         document: &[u8],
-    ) -> Result<(AssetView, bool), ServiceError> {
+        expected: &Expected,
+    ) -> Result<(Edition<AssetView>, bool), ServiceError> {
         let rig = asset_file::parse_new(document)?;
         if rig.name != name {
             let reason = format!("`{}` differs from `{name}` in the path", rig.name);
             return Err(Invalid::new("/name", reason).into());
         }
-        let view = asset_file::view(&rig);
-        let replace = |reply| AssetCommand::Replace { rig: Box::new(rig.clone()), reply };
+        let edition = Edition::of(asset_file::view(&rig))?;
+        let replace = |reply| {
+            let (rig, expected) = (Box::new(rig.clone()), expected.clone());
+            AssetCommand::Replace { rig, expected, reply }
+        };
         match self.inner.shards.call(name, replace).await {
-            Ok(()) => Ok((view, false)),
+            Ok(()) => Ok((edition, false)),
             Err(ServiceError::UnknownAsset { .. }) => {
+                expected.check(None)?;
                 self.create(&rig).await?;
-                Ok((view, true))
+                Ok((edition, true))
             }
             Err(error) => Err(error),
         }
@@ -111,12 +124,14 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`], also while it is being deleted;
+    /// [`ServiceError::Changed`] if its file is not the expected one;
     /// [`ServiceError::NotStored`] if the store does not accept a part; the next sweep of
     /// retention continues the deletion.
-    pub async fn delete_asset(&self, name: &str) -> Result<(), ServiceError> {
+    pub async fn delete_asset(&self, name: &str, expected: Expected) -> Result<(), ServiceError> {
         let (this, name) = (self.clone(), name.to_owned());
         let deletion = async move {
-            this.inner.shards.call(&name, |reply| AssetCommand::Delete { reply }).await?;
+            let delete = |reply| AssetCommand::Delete { expected, reply };
+            this.inner.shards.call(&name, delete).await?;
             this.inner.principals.clear();
             this.inner.mutes.remove_asset(&name);
             this.inner.deleter.asset(&name).await

@@ -7,15 +7,17 @@ use uuid::Uuid;
 use crate::clock::rfc3339;
 use crate::notifications::test_message;
 use crate::notifications::{MAX_CHANNELS, MAX_RULES, delivery, settings, stored};
-use crate::{Service, ServiceError, views};
+use crate::{EntityTag, Expected, Service, ServiceError, views};
 use offbd_core::vocabulary::Invalid;
-use offbd_store::{ChannelRow, DeliveryRow, LAST_ID, NotificationWrite, RuleRow, Write};
+use offbd_store::{
+    ChannelRow, DeliveryRow, EditWrite, Expectation, LAST_ID, NotificationWrite, RuleRow, Write,
+};
 use offbd_wire::notification::{
-    ChannelView, DeliveryView, MadeChannelView, NewChannelView, NewRuleView, NotificationView,
-    RuleView, StoredChannel,
+    ChannelView, DeliveryView, EmailView, MadeChannelView, NewChannelView, NewRuleView,
+    NotificationView, RuleView, StoredChannel,
 };
 use offbd_wire::service::Page;
-use offbd_wire::words::DeliveryState;
+use offbd_wire::words::{ChannelKind, DeliveryState};
 
 /// The parameters of a query for deliveries.
 #[derive(Clone, Debug, Default)]
@@ -30,6 +32,32 @@ impl Service {
         self.inner.handles.write_unpartitioned(Write::Notification(write)).await
     }
 
+    /// Makes a change if the request may replace any edition, or if what it replaces is still
+    /// `unchanged`; returns whether it is.
+    async fn edit_notifications(
+        &self,
+        expected: &Expected,
+        unchanged: Expectation,
+        write: NotificationWrite,
+    ) -> Result<bool, ServiceError> {
+        if expected.is_particular() {
+            let edit = EditWrite::Notification(write);
+            return self.inner.handles.edit(None, unchanged, edit).await;
+        }
+        self.change_notifications(write).await?;
+        Ok(true)
+    }
+
+    /// Returns the error of an edit of a channel that another one has preceded.
+    async fn changed_channel(&self, id: &str) -> ServiceError {
+        changed(self.channel_row(id).await.and_then(|row| channel_tag(&row)))
+    }
+
+    /// Returns the error of an edit of a rule that another one has preceded.
+    async fn changed_rule(&self, id: &str) -> ServiceError {
+        changed(self.rule_row(id).await.and_then(|row| rule_tag(&views::from_json(&row.document)?)))
+    }
+
     async fn channel_row(&self, id: &str) -> Result<ChannelRow, ServiceError> {
         let rows = self.inner.handles.store.channels().await?;
         let found = rows.into_iter().find(|row| row.id == id);
@@ -37,6 +65,7 @@ impl Service {
     }
 
     async fn channel_view(&self, row: ChannelRow) -> Result<ChannelView, ServiceError> {
+        let etag = channel_tag(&row)?.to_string();
         let store = &self.inner.handles.store;
         let count = async |state: DeliveryState| {
             let n = store.n_deliveries(&row.id, state.as_str()).await?;
@@ -44,15 +73,11 @@ impl Service {
         };
         let pending = count(DeliveryState::Pending).await?;
         let given_up = count(DeliveryState::GivenUp).await?;
-        let settings = stored(&row)?;
-        let kind = settings.kind();
-        let (url, email) = match settings {
-            StoredChannel::Webhook { url, .. } => (Some(url), None),
-            StoredChannel::Email(email) => (None, Some(settings::email_view(email))),
-        };
+        let (kind, url, email) = shown(stored(&row)?);
         let created_at = rfc3339(row.created_at);
         Ok(ChannelView {
             id: row.id,
+            etag,
             name: row.name,
             kind,
             url,
@@ -117,13 +142,16 @@ impl Service {
     /// Replaces the settings of a channel. A secret or password that is not given stays.
     ///
     /// # Errors
-    /// As for [`Self::create_channel`], and [`ServiceError::UnknownChannel`].
+    /// As for [`Self::create_channel`], and [`ServiceError::UnknownChannel`];
+    /// [`ServiceError::Changed`] if the present settings are not the expected ones.
     pub async fn put_channel(
         &self,
         id: &str,
         new: NewChannelView,
+        expected: &Expected,
     ) -> Result<MadeChannelView, ServiceError> {
         let row = self.channel_row(id).await?;
+        expected.check(Some(&channel_tag(&row)?))?;
         let name = new.name.clone();
         let targets = &self.inner.limits.notifications.targets;
         let (settings, secret) = settings::channel(new, Some(&stored(&row)?), targets)?;
@@ -131,23 +159,31 @@ impl Service {
         if others.iter().any(|other| other.name == name && other.id != id) {
             return Err(ServiceError::ChannelExists { name });
         }
-        let document = views::to_json(&settings)?;
-        let (id, name) = (row.id, name);
-        let update = NotificationWrite::UpdateChannel { id: id.clone(), name, document };
-        self.change_notifications(update).await?;
-        Ok(MadeChannelView { channel: self.channel(&id).await?, secret })
+        let updated = ChannelRow { name, document: views::to_json(&settings)?, ..row.clone() };
+        let (name, document) = (updated.name.clone(), updated.document.clone());
+        let update = NotificationWrite::UpdateChannel { id: row.id.clone(), name, document };
+        if !self.edit_notifications(expected, unchanged_channel(row), update).await? {
+            return Err(self.changed_channel(id).await);
+        }
+        Ok(MadeChannelView { channel: self.channel_view(updated).await?, secret })
     }
 
     /// Deletes a channel with its deliveries.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownChannel`]; [`ServiceError::ChannelInUse`] if a rule uses it.
-    pub async fn delete_channel(&self, id: &str) -> Result<(), ServiceError> {
+    /// [`ServiceError::UnknownChannel`]; [`ServiceError::ChannelInUse`] if a rule uses it;
+    /// [`ServiceError::Changed`] if its settings are not the expected ones.
+    pub async fn delete_channel(&self, id: &str, expected: &Expected) -> Result<(), ServiceError> {
         let row = self.channel_row(id).await?;
+        expected.check(Some(&channel_tag(&row)?))?;
         if let Some(rule) = self.rules().await?.into_iter().find(|r| r.rule.channel == id) {
             return Err(ServiceError::ChannelInUse { name: row.name, rule: rule.rule.name });
         }
-        self.change_notifications(NotificationWrite::DeleteChannel { id: row.id }).await
+        let delete = NotificationWrite::DeleteChannel { id: row.id.clone() };
+        if !self.edit_notifications(expected, unchanged_channel(row), delete).await? {
+            return Err(self.changed_channel(id).await);
+        }
+        Ok(())
     }
 
     /// Returns whether messages have links to the dashboard.
@@ -180,12 +216,17 @@ impl Service {
     /// [`ServiceError::Store`].
     pub async fn rules(&self) -> Result<Vec<RuleView>, ServiceError> {
         let names = self.channel_names().await?;
-        let view = |row: RuleRow| {
-            let rule: NewRuleView = views::from_json(&row.document)?;
-            let channel_name = names.get(&rule.channel).cloned().unwrap_or_default();
-            Ok(RuleView { id: row.id, channel_name, created_at: rfc3339(row.created_at), rule })
-        };
-        self.inner.handles.store.rules().await?.into_iter().map(view).collect()
+        let rows = self.inner.handles.store.rules().await?;
+        rows.into_iter().map(|row| rule_view(row, &names)).collect()
+    }
+
+    /// Returns a rule.
+    ///
+    /// # Errors
+    /// [`ServiceError::UnknownRule`].
+    pub async fn rule(&self, id: &str) -> Result<RuleView, ServiceError> {
+        let names = self.channel_names().await?;
+        rule_view(self.rule_row(id).await?, &names)
     }
 
     async fn channel_names(&self) -> Result<BTreeMap<String, String>, ServiceError> {
@@ -202,16 +243,30 @@ impl Service {
             return Err(ServiceError::TooManySettings { what: "rules", limit: MAX_RULES });
         }
         let (id, created_at) = (Uuid::now_v7().to_string(), self.inner.handles.clock.now());
-        self.put_rule_row(id, created_at, rule).await
+        let (row, names) = self.new_rule_row(id, created_at, &rule).await?;
+        self.change_notifications(NotificationWrite::PutRule(row.clone())).await?;
+        rule_view(row, &names)
     }
 
     /// Replaces a rule.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownRule`]; [`ServiceError::Invalid`] with the invalid element.
-    pub async fn put_rule(&self, id: &str, rule: NewRuleView) -> Result<RuleView, ServiceError> {
-        let row = self.rule_row(id).await?;
-        self.put_rule_row(row.id, row.created_at, rule).await
+    /// [`ServiceError::UnknownRule`]; [`ServiceError::Invalid`] with the invalid element;
+    /// [`ServiceError::Changed`] if the present rule is not the expected one.
+    pub async fn put_rule(
+        &self,
+        id: &str,
+        rule: NewRuleView,
+        expected: &Expected,
+    ) -> Result<RuleView, ServiceError> {
+        let found = self.rule_row(id).await?;
+        expected.check(Some(&rule_tag(&views::from_json(&found.document)?)?))?;
+        let (row, names) = self.new_rule_row(found.id.clone(), found.created_at, &rule).await?;
+        let put = NotificationWrite::PutRule(row.clone());
+        if !self.edit_notifications(expected, unchanged_rule(found), put).await? {
+            return Err(self.changed_rule(id).await);
+        }
+        rule_view(row, &names)
     }
 
     async fn rule_row(&self, id: &str) -> Result<RuleRow, ServiceError> {
@@ -220,29 +275,34 @@ impl Service {
         found.ok_or_else(|| ServiceError::UnknownRule { id: id.to_owned() })
     }
 
-    async fn put_rule_row(
+    /// Returns the row of a rule that is valid, and the names of the channels.
+    async fn new_rule_row(
         &self,
         id: String,
         created_at: i64,
-        rule: NewRuleView,
-    ) -> Result<RuleView, ServiceError> {
-        settings::check_rule(&rule)?;
-        let Some(channel_name) = self.channel_names().await?.remove(&rule.channel) else {
+        rule: &NewRuleView,
+    ) -> Result<(RuleRow, BTreeMap<String, String>), ServiceError> {
+        settings::check_rule(rule)?;
+        let names = self.channel_names().await?;
+        if !names.contains_key(&rule.channel) {
             return Err(Invalid::new("/channel", "is not the id of a channel").into());
-        };
-        let (channel, document) = (rule.channel.clone(), views::to_json(&rule)?);
-        let row = RuleRow { id: id.clone(), channel, document, created_at };
-        self.change_notifications(NotificationWrite::PutRule(row)).await?;
-        Ok(RuleView { id, channel_name, created_at: rfc3339(created_at), rule })
+        }
+        let (channel, document) = (rule.channel.clone(), views::to_json(rule)?);
+        Ok((RuleRow { id, channel, document, created_at }, names))
     }
 
     /// Deletes a rule, with its reminders.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownRule`].
-    pub async fn delete_rule(&self, id: &str) -> Result<(), ServiceError> {
+    /// [`ServiceError::UnknownRule`]; [`ServiceError::Changed`] if it is not the expected one.
+    pub async fn delete_rule(&self, id: &str, expected: &Expected) -> Result<(), ServiceError> {
         let row = self.rule_row(id).await?;
-        self.change_notifications(NotificationWrite::DeleteRule { id: row.id }).await
+        expected.check(Some(&rule_tag(&views::from_json(&row.document)?)?))?;
+        let delete = NotificationWrite::DeleteRule { id: row.id.clone() };
+        if !self.edit_notifications(expected, unchanged_rule(row), delete).await? {
+            return Err(self.changed_rule(id).await);
+        }
+        Ok(())
     }
 
     /// Returns a page of deliveries, the latest first.
@@ -277,6 +337,44 @@ impl Service {
         let name = self.channel_names().await?.remove(&row.channel);
         delivery_view(row, name)
     }
+}
+
+fn changed(now: Result<EntityTag, ServiceError>) -> ServiceError {
+    now.map_or_else(|error| error, |now| ServiceError::Changed { now: Some(now) })
+}
+
+fn unchanged_channel(row: ChannelRow) -> Expectation {
+    Expectation::Channel { id: row.id, name: row.name, document: row.document }
+}
+
+fn unchanged_rule(row: RuleRow) -> Expectation {
+    Expectation::Rule { id: row.id, document: row.document }
+}
+
+/// Returns the settings of a channel without its secrets.
+fn shown(settings: StoredChannel) -> (ChannelKind, Option<String>, Option<EmailView>) {
+    let kind = settings.kind();
+    match settings {
+        StoredChannel::Webhook { url, .. } => (kind, Some(url), None),
+        StoredChannel::Email(email) => (kind, None, Some(settings::email_view(email))),
+    }
+}
+
+/// Returns the tag of a channel's settings. A secret has no part in it: one that a change does not
+/// give stays, so that no change overwrites it unseen.
+fn channel_tag(row: &ChannelRow) -> Result<EntityTag, ServiceError> {
+    EntityTag::of(&(&row.name, shown(stored(row)?)))
+}
+
+fn rule_tag(rule: &NewRuleView) -> Result<EntityTag, ServiceError> {
+    EntityTag::of(rule)
+}
+
+fn rule_view(row: RuleRow, names: &BTreeMap<String, String>) -> Result<RuleView, ServiceError> {
+    let rule: NewRuleView = views::from_json(&row.document)?;
+    let channel_name = names.get(&rule.channel).cloned().unwrap_or_default();
+    let (etag, created_at) = (rule_tag(&rule)?.to_string(), rfc3339(row.created_at));
+    Ok(RuleView { id: row.id, etag, channel_name, created_at, rule })
 }
 
 fn delivery_view(

@@ -1,7 +1,7 @@
 //! The tags of rigs.
 
-use crate::{Service, ServiceError, tags, views};
-use offbd_store::Write;
+use crate::{Edition, Expected, Service, ServiceError, tags, views};
+use offbd_store::{EditWrite, Expectation, Write};
 use offbd_wire::service::Page;
 use offbd_wire::tag::{TagUseView, TagsView};
 
@@ -10,22 +10,38 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`].
-    pub async fn tags(&self, asset: &str) -> Result<TagsView, ServiceError> {
+    pub async fn tags(&self, asset: &str) -> Result<Edition<TagsView>, ServiceError> {
         self.check_known(asset).await?;
         let mut known = self.inner.handles.store.tags_of([asset]).await?;
-        Ok(TagsView { tags: known.remove(asset).unwrap_or_default() })
+        Edition::of(TagsView { tags: known.remove(asset).unwrap_or_default() })
     }
 
     /// Replaces the tags of an asset; returns them as they are stored.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] with the invalid tag.
-    pub async fn put_tags(&self, asset: &str, new: TagsView) -> Result<TagsView, ServiceError> {
-        self.check_known(asset).await?;
+    /// [`ServiceError::UnknownAsset`]; [`ServiceError::Invalid`] with the invalid tag;
+    /// [`ServiceError::Changed`] if the present tags are not the expected ones.
+    pub async fn put_tags(
+        &self,
+        asset: &str,
+        new: TagsView,
+        expected: &Expected,
+    ) -> Result<Edition<TagsView>, ServiceError> {
+        let found = self.tags(asset).await?;
+        expected.check(Some(&found.tag))?;
         let tags = tags::checked(new.tags)?;
-        let write = Write::PutTags { asset: asset.to_owned(), tags: tags.clone() };
-        self.inner.handles.write(asset, vec![write]).await?;
-        Ok(TagsView { tags })
+        let (asset, new) = (asset.to_owned(), TagsView { tags: tags.clone() });
+        if expected.is_particular() {
+            let unchanged = Expectation::Tags { asset: asset.clone(), tags: found.value.tags };
+            let edit = EditWrite::Tags { asset: asset.clone(), tags };
+            if !self.inner.handles.edit(Some(&asset), unchanged, edit).await? {
+                return Err(ServiceError::Changed { now: Some(self.tags(&asset).await?.tag) });
+            }
+        } else {
+            let write = Write::PutTags { asset: asset.clone(), tags };
+            self.inner.handles.write(&asset, vec![write]).await?;
+        }
+        Edition::of(new)
     }
 
     /// Returns a page of the tags in use, in alphabetical order.

@@ -17,7 +17,9 @@ use super::events::READ_TIMEOUT;
 use crate::limits::SessionLimits;
 use crate::ownership::Ownership;
 use crate::{Clock, Limits, ServiceError};
-use offbd_store::{PartitionId, Store, StoreError, Write};
+use offbd_store::{
+    ConditionalWrite, EditWrite, Expectation, PartitionId, Store, StoreError, Write,
+};
 
 /// The shared handles of the service. Cheap to clone.
 #[derive(Clone)]
@@ -92,6 +94,23 @@ impl Handles {
     /// Makes a change durable that concerns no asset.
     pub(crate) async fn write_unpartitioned(&self, write: Write) -> Result<(), ServiceError> {
         self.commit(None, vec![write]).await
+    }
+
+    /// Makes an edit durable if what it replaces is still as it was read; returns whether it is.
+    /// `asset` is `None` for an edit that concerns none.
+    ///
+    /// # Errors
+    /// As for [`write`](Self::write).
+    pub(crate) async fn edit(
+        &self,
+        asset: Option<&str>,
+        expected: Expectation,
+        edit: EditWrite,
+    ) -> Result<bool, ServiceError> {
+        let (write, refusal) = ConditionalWrite::new(expected, edit);
+        let partition = asset.map(|asset| self.ownership.partition_of(asset));
+        self.commit(partition, vec![Write::Conditional(write)]).await?;
+        Ok(!refusal.is_refused())
     }
 
     /// Makes changes of `asset` durable together that do not belong to its engine.

@@ -10,9 +10,10 @@ use super::statements::{
     open_session, published, put_calibration, put_fault, put_learning, put_replay, update_asset,
 };
 use crate::{
-    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange, FaultRow,
-    Micros, NotificationWrite, PartitionId, RemarkWrite, ReplayRow, SessionEnd, SessionProgress,
-    SessionRow, Snapshot, StoreError, TransitionRow, TrendRow, snapshot, tag,
+    AccessWrite, ActionRow, AlarmWrite, AssetRow, CalibrationRow, CommunicationChange,
+    ConditionalWrite, FaultRow, Micros, NotificationWrite, PartitionId, RemarkWrite, ReplayRow,
+    SessionEnd, SessionProgress, SessionRow, Snapshot, StoreError, TransitionRow, TrendRow,
+    snapshot, tag,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -131,6 +132,9 @@ changes! {
     /// Replaces the tags of an asset.
     PutTags { asset: String, tags: Vec<String> } as ("the tags of asset `{asset}`")
         => tag::put(db, asset, tags);
+    /// A change of tags, rules or channels that depends on what is stored.
+    Conditional(write: ConditionalWrite) as ("a change of tags or notifications")
+        => write.apply(db);
     Access(write: AccessWrite) as ("a change of tokens, logins or the audit log")
         => write.apply(db);
     Alarm(write: AlarmWrite) as ("a change of mutes or notes") => write.apply(db);

@@ -1,5 +1,5 @@
 import { useRef, useState } from "preact/hooks";
-import { tagApi } from "../../api/tags";
+import { tagApi, type Tags } from "../../api/tags";
 import { useQuery } from "../../hooks/use-query";
 import { ActionButton } from "../../parts/action-button";
 import { Dialog } from "../../parts/dialog";
@@ -10,10 +10,11 @@ import { tagsIn } from "../../words/tags";
 
 /** The tags of a rig, each with the way to the rigs that have it. */
 export function RigTags({ asset }: { asset: string }) {
-  const { data: tags, refetch } = useQuery(() => tagApi.of(asset), `${asset} tags`);
+  const { data, refetch } = useQuery(() => tagApi.of(asset), `${asset} tags`);
   const [isOpen, setOpen] = useState(false);
   const refused = useRefusal("operator");
-  if (!tags) return null;
+  if (!data) return null;
+  const { tags } = data;
   return (
     <div class="chips">
       {tags.map((tag) => (
@@ -30,23 +31,25 @@ export function RigTags({ asset }: { asset: string }) {
       >
         {tags.length ? "Change tags" : "Add tags"}
       </button>
-      {isOpen && <TagsDialog asset={asset} tags={tags} changed={refetch} close={() => setOpen(false)} />}
+      {isOpen && <TagsDialog asset={asset} before={data} changed={refetch} close={() => setOpen(false)} />}
     </div>
   );
 }
 
 interface DialogProps {
   asset: string;
-  tags: string[];
+  /** The tags when the dialog was opened. */
+  before: Tags;
   changed: () => Promise<unknown>;
   close: () => void;
 }
 
-function TagsDialog({ asset, tags, changed, close }: DialogProps) {
-  const [text, setText] = useState(tags.join(" "));
+function TagsDialog({ asset, before, changed, close }: DialogProps) {
+  const [edited] = useState(before);
+  const [text, setText] = useState(edited.tags.join(" "));
   const saveButton = useRef<HTMLDivElement>(null);
   const save = async () => {
-    await tagApi.put(asset, tagsIn(text));
+    await tagApi.put(asset, tagsIn(text), edited);
     await changed();
     close();
   };

@@ -29,7 +29,8 @@ export function useImport({ fileName, assets, asset, setAsset, imported }: Impor
       await api.createAsset({ name: asset, columns });
       registered.current.push(asset);
     } else if (columns) {
-      await api.putAsset({ ...(await api.asset(asset)), columns });
+      const before = await api.asset(asset);
+      await api.putAsset({ ...before, columns }, before);
     }
     const result = await api.importRecording(asset, session, file, reading);
     if (result.rejected + result.late === 0 && !result.more_sessions?.length)

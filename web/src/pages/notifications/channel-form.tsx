@@ -22,7 +22,8 @@ interface Props {
 }
 
 /** Makes or changes a channel. */
-export function ChannelForm({ channel, made }: Props) {
+export function ChannelForm({ channel: before, made }: Props) {
+  const [channel] = useState(before);
   const [draft, setDraft] = useState(channel ? draftOf(channel) : EMPTY_DRAFT);
   const { kind, name, url } = draft;
   const hasEmail = useFeature()("email");
@@ -30,7 +31,7 @@ export function ChannelForm({ channel, made }: Props) {
   const change = (part: Partial<ChannelDraft>) => setDraft((before) => ({ ...before, ...part }));
   const save = async () => {
     const settings = channelOf(draft);
-    const saved = channel ? alarmApi.putChannel(channel.id, settings) : alarmApi.createChannel(settings);
+    const saved = channel ? alarmApi.putChannel(channel, settings) : alarmApi.createChannel(settings);
     made((await saved).secret);
   };
   return (

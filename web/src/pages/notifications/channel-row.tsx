@@ -13,7 +13,7 @@ export function ChannelRow({ channel, refetch }: { channel: Channel; refetch: ()
     await refetch();
   };
   const remove = async () => {
-    await alarmApi.deleteChannel(id);
+    await alarmApi.deleteChannel(channel);
     await refetch();
   };
   return (

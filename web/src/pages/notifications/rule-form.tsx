@@ -13,11 +13,12 @@ interface Props {
   saved: () => void;
 }
 
-export function RuleForm({ rule, channels, saved }: Props) {
+export function RuleForm({ rule: before, channels, saved }: Props) {
+  const [rule] = useState(before);
   const [draft, setDraft] = useState(() => (rule ? draftOf(rule) : firstDraft(channels[0]?.id ?? "")));
   const change = (part: Partial<RuleDraft>) => setDraft((before) => ({ ...before, ...part }));
   const save = async () => {
-    await (rule ? alarmApi.putRule(rule.id, ruleOf(draft, rule)) : alarmApi.createRule(ruleOf(draft)));
+    await (rule ? alarmApi.putRule(rule, ruleOf(draft, rule)) : alarmApi.createRule(ruleOf(draft)));
     saved();
   };
   return (

@@ -54,11 +54,11 @@ function RuleActions({ rule, channels, refetch }: Required<Props>) {
   const isMuted = isSilent(rule);
   const muteEnd = () => new Date(Date.now() + MUTE_H * 3_600_000).toISOString();
   const change = (more: Partial<NewRule>) => async () => {
-    await alarmApi.putRule(rule.id, { ...settingsOf(rule), ...more });
+    await alarmApi.putRule(rule, { ...settingsOf(rule), ...more });
     await refetch();
   };
   const remove = async () => {
-    await alarmApi.deleteRule(rule.id);
+    await alarmApi.deleteRule(rule);
     await refetch();
   };
   return (

@@ -33,7 +33,7 @@ export function Check({ asset, changed, next }: Props) {
   const axes: AssetAxes = { ...DEFAULT_AXES, ...asset.axes };
   // Earlier samples had other axes, so a new session starts and the comparison is reset.
   const change = async (part: Partial<AssetAxes>) => {
-    await api.putAsset({ ...asset, axes: { ...axes, ...part } });
+    await api.putAsset({ ...asset, axes: { ...axes, ...part } }, asset);
     if (state?.session_id) {
       await api.endSession(state.session_id);
       setEnded(true);

@@ -13,7 +13,7 @@ import { UnitFields } from "./unit-fields";
 interface Props {
   /** The registered rig; missing if it is new. */
   asset?: Asset;
-  done: (name: string) => void;
+  done: (name: string) => void | Promise<void>;
 }
 
 export function Describe({ asset, done }: Props) {
@@ -29,8 +29,8 @@ export function Describe({ asset, done }: Props) {
     setError(undefined);
     try {
       const wanted = assetOf(description, asset);
-      await (asset ? api.putAsset(wanted) : api.createAsset(wanted));
-      done(description.name);
+      await (asset ? api.putAsset(wanted, asset) : api.createAsset(wanted));
+      await done(description.name);
     } catch (thrown) {
       setError(thrown);
     }

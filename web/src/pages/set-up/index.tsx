@@ -37,7 +37,11 @@ export function SetUpPage({ name }: { name?: string }) {
   if (name && !asset)
     return <UnloadedPage title={title} what={name} kind="rig" error={error} retry={refetch} />;
   const goTo = (next: SetUpStep) => navigate(setUpPath(name!, next));
-  const connect = (created: string) => navigate(setUpPath(created, "connect"));
+  // The next steps change the description, as it is now.
+  const connect = async (described: string) => {
+    if (described === name) await refetch();
+    navigate(setUpPath(described, "connect"));
+  };
   return (
     <main class="set-up">
       <header class="page-head">

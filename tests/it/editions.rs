@@ -1,0 +1,200 @@
+//! `ETag` and `If-Match`: of two people who edit the same thing, the second does not overwrite the
+//! change of the first unseen.
+
+use std::collections::BTreeMap;
+
+use crate::support::{Answer, Client, ServiceFixture};
+use proptest::prelude::*;
+use proptest::test_runner::{Config as Cases, TestRunner};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+/// Makes the content of something from a number and the id of a channel.
+type Content = fn(usize, &str) -> Value;
+
+/// Something that is edited, with a number in its content.
+#[derive(Clone, Debug)]
+struct Edited {
+    path: String,
+    content: Content,
+    /// The id of the channel of a rule.
+    channel: String,
+}
+
+impl Edited {
+    fn content(&self, n: usize) -> Value {
+        (self.content)(n, &self.channel)
+    }
+}
+
+/// A hook to which nothing is sent.
+const URL: &str = "http://127.0.0.1:9/";
+
+fn rig(n: usize, _: &str) -> Value {
+    json!({ "name": "a", "sample_rate_hz": 100, "ball": { "radius_m": 0.02 + 0.0001 * n as f64 } })
+}
+
+fn tags(n: usize, _: &str) -> Value {
+    json!({ "tags": ["hall", format!("t{n}")] })
+}
+
+fn channel(n: usize, _: &str) -> Value {
+    json!({ "name": format!("hook {n}"), "webhook": { "url": URL } })
+}
+
+fn rule(n: usize, channel: &str) -> Value {
+    json!({ "name": format!("rule {n}"), "channel": channel, "changes": ["confirmed"] })
+}
+
+/// Makes one of everything that is edited, each with the number 0.
+async fn edited(client: &Client) -> Vec<Edited> {
+    client.put("assets/a", &rig(0, "")).await.expect(201);
+    client.put("assets/a/tags", &tags(0, "")).await.expect(200);
+    let hook = client.post("notifications/channels", &channel(0, "")).await.expect(201);
+    let hook = hook["id"].as_str().unwrap().to_owned();
+    let made = client.post("notifications/rules", &rule(0, &hook)).await.expect(201);
+    let rules = format!("notifications/rules/{}", made["id"].as_str().unwrap());
+    let channels = format!("notifications/channels/{hook}");
+    let all: [(&str, Content); 4] =
+        [("assets/a", rig), ("assets/a/tags", tags), (&channels, channel), (&rules, rule)];
+    let of = |(path, content): (&str, _)| Edited {
+        path: path.to_owned(),
+        content,
+        channel: hook.clone(),
+    };
+    all.into_iter().map(of).collect()
+}
+
+fn tag(answer: &Answer) -> String {
+    answer.headers["etag"].to_str().unwrap().to_owned()
+}
+
+async fn send(client: &Client, method: Method, path: &str, body: &Value, tag: &str) -> Answer {
+    client.send(client.request(method, path).json(body).header("if-match", tag)).await
+}
+
+#[tokio::test]
+async fn the_second_of_two_editors_gets_412_with_the_present_tag() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    for each in edited(client).await {
+        let path = &each.path;
+        let read = tag(&client.get(path).await);
+        let first = send(client, Method::PUT, path, &each.content(1), &read).await;
+        first.expect(200);
+        assert_ne!(tag(&first), read, "{path}");
+        let second = send(client, Method::PUT, path, &each.content(2), &read).await;
+        let problem = second.problem(412);
+        assert_eq!(problem["type"], "urn:offbd:problem:changed", "{path}");
+        assert_eq!(problem["etag"], tag(&first), "{path}");
+        assert_eq!(tag(&second), tag(&first), "{path}");
+        assert!(problem["detail"].as_str().unwrap().contains(&tag(&first)), "{problem}");
+        let now = client.get(path).await;
+        assert_eq!(tag(&now), tag(&first), "nothing has changed at {path}");
+        if now.json().get("etag").is_some() {
+            assert_eq!(now.json()["etag"], tag(&first), "{path}");
+        }
+        // With the tag of the problem, among others, the editor can go on; a proxy may weaken it.
+        let tags = format!("\"x\", W/{}", problem["etag"].as_str().unwrap());
+        send(client, Method::PUT, path, &each.content(2), &tags).await.expect(200);
+        send(client, Method::PUT, path, &each.content(3), "*").await.expect(200);
+        // Without `If-Match`, as ever.
+        client.put(path, &each.content(4)).await.expect(200);
+        send(client, Method::PUT, path, &each.content(5), "x").await.problem(400);
+    }
+}
+
+#[tokio::test]
+async fn what_somebody_has_changed_is_not_deleted_unseen() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    let all = edited(client).await;
+    // Tags are not deleted. A rule is deleted before its channel.
+    for each in all.iter().rev().filter(|each| !each.path.ends_with("/tags")) {
+        let path = &each.path;
+        let read = tag(&client.get(path).await);
+        client.put(path, &each.content(1)).await.expect(200);
+        let refused = send(client, Method::DELETE, path, &Value::Null, &read).await;
+        let now = refused.problem(412)["etag"].as_str().unwrap().to_owned();
+        assert_eq!(tag(&client.get(path).await), now, "{path}");
+        send(client, Method::DELETE, path, &Value::Null, &now).await.expect(204);
+        client.get(path).await.problem(404);
+    }
+    // Who edits a rig does not register it again after its deletion.
+    for tag in ["*", "\"0\""] {
+        let refused = send(client, Method::PUT, "assets/a", &rig(2, ""), tag).await;
+        assert_eq!(refused.problem(412)["etag"], Value::Null);
+    }
+    client.get("assets/a").await.problem(404);
+}
+
+/// All have read the same edition, and send at the same time.
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn exactly_one_of_many_simultaneous_editors_succeeds() {
+    const EDITORS: usize = 16;
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    for each in edited(client).await {
+        for round in 0..5 {
+            let read = tag(&client.get(&each.path).await);
+            let editors: Vec<_> = (1..=EDITORS)
+                .map(|n| {
+                    let (client, each, read) = (client.clone(), each.clone(), read.clone());
+                    tokio::spawn(async move {
+                        let content = each.content(100 * (round + 1) + n);
+                        send(&client, Method::PUT, &each.path, &content, &read).await
+                    })
+                })
+                .collect();
+            let mut made = Vec::new();
+            for editor in editors {
+                let answer = editor.await.unwrap();
+                match answer.status.as_u16() {
+                    200 => made.push(tag(&answer)),
+                    _ => drop(answer.problem(412)),
+                }
+            }
+            assert_eq!(made, [tag(&client.get(&each.path).await)], "{each:?}");
+        }
+    }
+}
+
+#[test]
+fn the_tag_changes_exactly_when_the_content_does() {
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    let fixture = runtime.block_on(ServiceFixture::start());
+    let client = &fixture.client;
+    let all = runtime.block_on(edited(client));
+    let steps = proptest::collection::vec((0..all.len(), 0..4_usize, any::<bool>()), 1..12);
+    let mut runner = TestRunner::new(Cases::with_cases(20));
+    let result = runner.run(&steps, |steps| {
+        runtime.block_on(async {
+            // The content by its tag and the tag by its content, of everything.
+            let (mut contents, mut tags) = (BTreeMap::new(), BTreeMap::new());
+            for (which, n, is_named) in steps {
+                let each = &all[which];
+                let before = tag(&client.get(&each.path).await);
+                let condition = if is_named { before.as_str() } else { "*" };
+                let put = send(client, Method::PUT, &each.path, &each.content(n), condition).await;
+                put.expect(200);
+                for other in &all {
+                    let now = client.get(&other.path).await;
+                    let mut content = now.json();
+                    // Not what is edited: where it is, and what happens with it.
+                    for key in ["etag", "channel_name", "pending", "given_up"] {
+                        content.as_object_mut().unwrap().remove(key);
+                    }
+                    let (key, content) = ((other.path.clone(), tag(&now)), content.to_string());
+                    let of_tag = contents.entry(key).or_insert_with(|| content.clone());
+                    prop_assert_eq!(&*of_tag, &content);
+                    let key = (other.path.clone(), content);
+                    let of_content = tags.entry(key).or_insert_with(|| tag(&now));
+                    prop_assert_eq!(&*of_content, &tag(&now));
+                }
+                prop_assert_eq!(tag(&put), tag(&client.get(&each.path).await));
+            }
+            Ok(())
+        })
+    });
+    result.unwrap();
+}
