@@ -18,6 +18,7 @@ mod answer;
 mod block;
 mod estimate;
 mod filter;
+mod least_squares;
 mod path_error;
 
 #[cfg(not(feature = "std"))]
@@ -29,8 +30,8 @@ pub use estimate::ServoEstimate;
 use serde::{Deserialize, Serialize};
 
 use block::{BlockBuilder, ReadingBlock};
-use estimate::SessionEstimator;
 use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
+use least_squares::LeastSquares;
 use path_error::PathError;
 
 use super::calibration::MOST_MODEL_ERROR_M_S2;
@@ -180,7 +181,7 @@ pub struct ServoFilterBank {
     /// Time of motion followed since the session began or a gap ended, s.
     followed_s: f64,
     steady_m_s2: f64,
-    session: SessionEstimator,
+    least_squares: LeastSquares,
     path: PathError,
 }
 
@@ -198,7 +199,7 @@ impl ServoFilterBank {
             log_likelihood_nats: 0.0,
             followed_s: 0.0,
             steady_m_s2: 0.0,
-            session: SessionEstimator::default(),
+            least_squares: LeastSquares::default(),
             path: PathError::default(),
         }
     }
@@ -208,6 +209,7 @@ impl ServoFilterBank {
     pub fn take(&mut self, t: f64, measured_m: f64, path: &TwinPath) -> bool {
         let Some(block) = self.builder.take(t, measured_m, path) else { return false };
         self.path.take(block.t, block.deviation_m());
+        self.least_squares.take(&block);
         let Some(last) = self.last.replace(block) else {
             let variance = self.prior.variance(block.n);
             self.healthy.anchor(block.deviation_m(), variance);
@@ -242,7 +244,6 @@ impl ServoFilterBank {
             true => self.rising_since.or(Some(last.t)),
             false => None,
         };
-        self.session.take(dt, &self.faulty, &FAULTY);
     }
 
     /// Stops following the ball, which cannot respond or was not seen. The estimates of
@@ -250,6 +251,7 @@ impl ServoFilterBank {
     pub fn pause(&mut self) {
         self.builder.drop();
         self.path.pause();
+        self.least_squares.pause();
         self.last = None;
     }
 
@@ -274,6 +276,7 @@ impl ServoFilterBank {
     /// `velocity` m/s.
     pub fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
         self.builder.drop();
+        self.least_squares.pause();
         self.path.rebase(t, position, velocity);
         let Some(last) = &mut self.last else { return };
         let at_last = position + velocity * (last.t - t);
@@ -340,7 +343,7 @@ impl ServoFilterBank {
     /// The response over the session; `None` if too little was seen.
     #[must_use]
     pub fn estimate(&self) -> Option<ServoEstimate> {
-        self.session.estimate()
+        self.least_squares.estimate()
     }
 }
 
