@@ -17,9 +17,9 @@ fn session(seed: u64, seconds: usize, fault: Option<&str>) -> Vec<Sample> {
     (0..seconds * 100).map(|_| rig.next_sample()).collect()
 }
 
-/// Returns session `i` of a rig whose x servo loses one percent of its gain per session.
+/// Returns session `i` of a rig whose x servo loses 1.2 % of its gain per session.
 fn weakening(i: u64) -> Vec<Sample> {
-    let gain = format!("x_servo:gain={}@0", 1.0 - 0.01 * i as f64);
+    let gain = format!("x_servo:gain={}@0", 1.0 - 0.012 * i as f64);
     session(100 + i, 60, (i > 0).then_some(gain.as_str()))
 }
 
@@ -100,11 +100,11 @@ async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
     let of_points = gains(&view["points"], |point| &point["x"]["gain"]);
     assert_eq!(of_series[of_series.len() - of_points.len()..], of_points);
 
-    // The confidence interval contains the injected slope. At one percent per session, the
-    // limit of 0.3 is reached after 30 sessions, of which 12 are over.
+    // The confidence interval contains the injected slope. At 1.2 % per session, the limit
+    // of 0.3 is reached after 25 sessions, of which 12 are over.
     let gain = &view["trends"][0];
     let number = |key: &str| gain[key].as_f64().unwrap();
-    assert!((number("slope_low")..number("slope_high")).contains(&-0.01), "{gain}");
+    assert!((number("slope_low")..number("slope_high")).contains(&-0.012), "{gain}");
     assert!(number("slope_high") < 0.0, "{gain}");
     let left = warning["sessions_left"].as_f64().unwrap();
     assert!((8.0..=20.0).contains(&left), "{left}");
@@ -165,11 +165,11 @@ async fn without_a_calibration_there_are_estimates_but_no_trends() {
             "asset": "new", "calibration_id": null, "points": [], "trends": [],
         })
     );
-    import(client, "new", "short", &session(1, 10, None)).await;
+    import(client, "new", "short", &session(1, 5, None)).await;
     import(client, "new", "long", &session(2, 40, None)).await;
     let view = trends(client, "new").await;
     let points = view["points"].as_array().unwrap();
-    assert_eq!(points.len(), 1, "ten seconds are too few: {view}");
+    assert_eq!(points.len(), 1, "five seconds are too few: {view}");
     assert_eq!((&points[0]["session"], &points[0]["samples"]), (&json!("long"), &json!(4000)));
     assert!(points[0]["x"]["gain_error"].as_f64().unwrap() > 0.0);
     assert_eq!(view["trends"], json!([]));

@@ -54,7 +54,7 @@ test("motion is gathered, a calibration offered and confirmed", async () => {
   await panel(view)
     .getByText(/Calibrated from 1 session; further healthy sessions refine it until it is based on 5/)
     .waitFor();
-  await drift.getByText("0 of 7 sessions so far").waitFor();
+  await drift.getByText("0 of 6 sessions so far").waitFor();
   const { calibration } = await ask(service.url, "GET", "/assets/new");
   assert.ok(
     Math.abs(calibration.x.gain - rig.learnt.calibration.x.gain) < 0.05,

@@ -18,7 +18,7 @@ pub struct TrendsView {
     /// Estimates of the last 200 sessions, oldest first.
     pub points: Vec<TrendPointView>,
     /// Trends over the sessions that were judged with this calibration: one for each axis and
-    /// parameter with at least seven estimates.
+    /// parameter with at least six estimates.
     pub trends: Vec<TrendView>,
 }
 

@@ -3,8 +3,9 @@
 //!
 //! The line is that of Theil and Sen: the median of the slopes between all pairs of
 //! sessions, which is robust against outliers (breakdown point 29 %). Its confidence
-//! interval is Sen's, from the distribution of Kendall's S without drift. Independent of
-//! rigs: the input is one number per session.
+//! interval is Student's, from the scatter of the sessions about the line; as long as these
+//! are few, the usual scatter of sessions counts too. Independent of rigs: the input is one
+//! number per session.
 
 mod drift;
 
@@ -18,14 +19,21 @@ use crate::maths::{median, robust_deviation};
 /// since every pair has a slope. Chosen.
 pub const MAX_SESSIONS: usize = 200;
 
-/// Fewest sessions that make a trend: with seven, a run that rises or falls
-/// throughout has a chance of 2/7! = 0.04 % without any drift; with six, 0.3 %.
-pub const LEAST_SESSIONS: usize = 7;
+/// Fewest sessions that make a trend. Chosen: a drift of 2 % a session, which reaches its
+/// limit with the fifteenth, is then found while there is time to act.
+pub const LEAST_SESSIONS: usize = 6;
 
 /// Quantile of the normal distribution for a two-sided confidence of 99.9 %. It is that
 /// high because a rig has six parameters, each tested after every session, and a false
 /// drift of a noisy one extrapolates to its limit.
 const QUANTILE: f64 = 3.291;
+
+/// Number of sessions as which the usual scatter counts. Chosen: as many as make a trend.
+const USUAL_COUNTS: f64 = 6.0;
+
+/// Variance of a slope by least squares over that of Theil and Sen, for normal values and
+/// many sessions: 3/π (Sen 1968, section 5).
+const EFFICIENCY: f64 = 0.955;
 
 /// Standard error of a median over that of a mean, for normal values: √(π/2).
 const MEDIAN_ERROR: f64 = 1.2533;
@@ -49,10 +57,11 @@ pub struct Trend {
 }
 
 impl Trend {
-    /// Fits the line to `values`, one per session, oldest first; `None` for fewer than
+    /// Fits the line to `values`, one per session, oldest first, which usually scatter by
+    /// `usual_scatter` (> 0, their unit) about their line; `None` for fewer than
     /// [`LEAST_SESSIONS`]. Values that are not finite do not count.
     #[must_use]
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub fn of(values: &[f64], usual_scatter: f64) -> Option<Self> {
         let values = &values[values.len().saturating_sub(MAX_SESSIONS)..];
         let points: Vec<(f64, f64)> = values
             .iter()
@@ -63,17 +72,16 @@ impl Trend {
         if points.len() < LEAST_SESSIONS {
             return None;
         }
-        let mut slopes = slopes(&points);
-        let slope = median(&mut slopes)?;
-        slopes.sort_by(f64::total_cmp);
-        let (slope_low, slope_high) = confidence(&slopes, points.len());
+        let n = points.len() as f64;
+        let slope = median(&mut slopes(&points))?;
         let last = values.len() as f64 - 1.0;
         let mut levels: Vec<f64> = points.iter().map(|(i, v)| v + slope * (last - i)).collect();
+        let slope_error = slope_error(&points, &levels, usual_scatter);
         let level = median(&mut levels)?;
-        let scattered =
-            MEDIAN_ERROR * robust_deviation(&mut levels)? / (points.len() as f64).sqrt();
-        let turned = (slope_high - slope_low) / (2.0 * QUANTILE) * last / 2.0;
-        let level_error = scattered.hypot(turned);
+        let scattered = MEDIAN_ERROR * robust_deviation(&mut levels)? / n.sqrt();
+        let level_error = scattered.hypot(slope_error * last / 2.0);
+        let reach = student_quantile(USUAL_COUNTS + n - 2.0) * slope_error;
+        let (slope_low, slope_high) = (slope - reach, slope + reach);
         Some(Self { slope, slope_low, slope_high, level, level_error, n_sessions: points.len() })
     }
 
@@ -104,18 +112,31 @@ fn slopes(points: &[(f64, f64)]) -> Vec<f64> {
     slopes
 }
 
-/// Sen's confidence interval (Sen 1968, J. Am. Stat. Assoc. 63, eq. 2.6, with the normal
-/// approximation of its section 3): the slopes C/2 ranks on either side of the middle,
-/// where C = z √(n(n−1)(2n+5)/18) is the quantile of Kendall's S. `slopes` of `n` points
-/// are ascending.
-fn confidence(slopes: &[f64], n: usize) -> (f64, f64) {
-    let n = n as f64;
-    let spread = QUANTILE * (n * (n - 1.0) * (2.0 * n + 5.0) / 18.0).sqrt();
-    let n_slopes = slopes.len() as f64;
-    let below = ((n_slopes - spread) / 2.0).floor();
-    let above = ((n_slopes + spread) / 2.0).ceil();
-    let at = |rank: f64| slopes[(rank.max(0.0) as usize).min(slopes.len() - 1)];
-    (if below < 1.0 { slopes[0] } else { at(below - 1.0) }, at(above))
+/// Standard error of the slope through `points`, which the line takes to `levels` at the
+/// last session.
+fn slope_error(points: &[(f64, f64)], levels: &[f64], usual_scatter: f64) -> f64 {
+    let n = points.len() as f64;
+    let squares_about_mean = |values: &mut dyn Iterator<Item = f64>| {
+        let values: Vec<f64> = values.collect();
+        let mean = values.iter().sum::<f64>() / n;
+        values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>()
+    };
+    let left = squares_about_mean(&mut levels.iter().copied());
+    let spread = squares_about_mean(&mut points.iter().map(|(i, _)| *i));
+    let usual = USUAL_COUNTS * usual_scatter * usual_scatter;
+    let variance = (usual + left) / (USUAL_COUNTS + n - 2.0);
+    (variance / (EFFICIENCY * spread)).sqrt()
+}
+
+/// The quantile of Student's distribution with `freedom` ≥ 10 degrees of freedom for the
+/// confidence of [`QUANTILE`], by the first terms of its expansion (Abramowitz & Stegun
+/// 1964, 26.7.5).
+fn student_quantile(freedom: f64) -> f64 {
+    let z = QUANTILE;
+    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    z + (z3 + z) / (4.0 * freedom)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * freedom.powi(2))
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * freedom.powi(3))
 }
 
 /// The range of an estimate that is no fault.

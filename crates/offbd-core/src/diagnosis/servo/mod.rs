@@ -18,6 +18,7 @@ mod answer;
 mod block;
 mod estimate;
 mod filter;
+mod least_squares;
 mod path_error;
 
 #[cfg(not(feature = "std"))]
@@ -29,8 +30,8 @@ pub use estimate::ServoEstimate;
 use serde::{Deserialize, Serialize};
 
 use block::{BlockBuilder, ReadingBlock};
-use estimate::SessionEstimator;
-use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
+use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter, ServoKnowledge};
+use least_squares::LeastSquares;
 use path_error::PathError;
 
 use super::calibration::MOST_MODEL_ERROR_M_S2;
@@ -180,25 +181,33 @@ pub struct ServoFilterBank {
     /// Time of motion followed since the session began or a gap ended, s.
     followed_s: f64,
     steady_m_s2: f64,
-    session: SessionEstimator,
+    /// What was known of the healthy servo, and the session's offset, m/s², when the
+    /// evidence last was zero.
+    before: (ServoKnowledge, f64),
+    /// Whether the healthy hypothesis keeps to that: the servo's fault is confirmed.
+    held: bool,
+    least_squares: LeastSquares,
     path: PathError,
 }
 
 impl ServoFilterBank {
     #[must_use]
     pub fn new(prior: AxisPrior) -> Self {
+        let healthy = ServoFilter::new(prior.parameters());
         Self {
             prior,
             builder: BlockBuilder::default(),
             last: None,
-            healthy: ServoFilter::new(prior.parameters()),
+            healthy,
             faulty: ServoFilter::new(FAULTY),
             nats: 0.0,
             rising_since: None,
             log_likelihood_nats: 0.0,
             followed_s: 0.0,
             steady_m_s2: 0.0,
-            session: SessionEstimator::default(),
+            before: (healthy.knowledge(), 0.0),
+            held: false,
+            least_squares: LeastSquares::default(),
             path: PathError::default(),
         }
     }
@@ -208,6 +217,7 @@ impl ServoFilterBank {
     pub fn take(&mut self, t: f64, measured_m: f64, path: &TwinPath) -> bool {
         let Some(block) = self.builder.take(t, measured_m, path) else { return false };
         self.path.take(block.t, block.deviation_m());
+        self.least_squares.take(&block);
         let Some(last) = self.last.replace(block) else {
             let variance = self.prior.variance(block.n);
             self.healthy.anchor(block.deviation_m(), variance);
@@ -232,8 +242,10 @@ impl ServoFilterBank {
         let healthy = self.healthy.correct(y, variance, dt);
         self.log_likelihood_nats += healthy;
         self.followed_s += dt;
-        let share = dt / self.followed_s.min(STEADY_S);
-        self.steady_m_s2 += share * (self.healthy.parameter(0).0 - self.steady_m_s2);
+        if !self.held {
+            let share = dt / self.followed_s.min(STEADY_S);
+            self.steady_m_s2 += share * (self.healthy.parameter(0).0 - self.steady_m_s2);
+        }
         if self.followed_s < SETTLED_S {
             return;
         }
@@ -242,7 +254,28 @@ impl ServoFilterBank {
             true => self.rising_since.or(Some(last.t)),
             false => None,
         };
-        self.session.take(dt, &self.faulty, &FAULTY);
+        if self.nats == 0.0 && !self.held {
+            self.before = (self.healthy.knowledge(), self.steady_m_s2);
+        }
+    }
+
+    /// The fault of the servo is confirmed: until [`release`](Self::release) the healthy
+    /// hypothesis keeps to what was known before its evidence rose. It would else learn a
+    /// fault that lasts, which would pass its test, and take its end for another fault.
+    pub fn hold(&mut self) {
+        if self.held {
+            return;
+        }
+        self.held = true;
+        let (known, steady_m_s2) = self.before;
+        self.healthy.hold(&known);
+        self.steady_m_s2 = steady_m_s2;
+    }
+
+    /// The fault of the servo is over: the healthy hypothesis learns again.
+    pub const fn release(&mut self) {
+        self.held = false;
+        self.healthy.release();
     }
 
     /// Stops following the ball, which cannot respond or was not seen. The estimates of
@@ -250,6 +283,7 @@ impl ServoFilterBank {
     pub fn pause(&mut self) {
         self.builder.drop();
         self.path.pause();
+        self.least_squares.pause();
         self.last = None;
     }
 
@@ -265,6 +299,7 @@ impl ServoFilterBank {
     /// Resets the evidence: another cause explains it.
     pub fn exonerate(&mut self) {
         self.pause();
+        self.release();
         self.path.clear();
         self.faulty = ServoFilter::new(FAULTY);
         (self.nats, self.rising_since) = (0.0, None);
@@ -274,6 +309,7 @@ impl ServoFilterBank {
     /// `velocity` m/s.
     pub fn rebase(&mut self, t: f64, position: f64, velocity: f64) {
         self.builder.drop();
+        self.least_squares.pause();
         self.path.rebase(t, position, velocity);
         let Some(last) = &mut self.last else { return };
         let at_last = position + velocity * (last.t - t);
@@ -315,6 +351,8 @@ impl ServoFilterBank {
     #[must_use]
     pub fn least_pull_m_s2(&self, twin_m_s2: f64) -> f64 {
         let (offset, variance) = self.healthy.parameter(0);
+        // A slipped horn changes what the plate demands as the session's level does.
+        let offset = if self.held { self.faulty.parameter(0).0 } else { offset };
         ((twin_m_s2 + offset).abs() - LEVEL_ERRORS * variance.sqrt()).max(0.0)
     }
 
@@ -340,7 +378,7 @@ impl ServoFilterBank {
     /// The response over the session; `None` if too little was seen.
     #[must_use]
     pub fn estimate(&self) -> Option<ServoEstimate> {
-        self.session.estimate()
+        self.least_squares.estimate()
     }
 }
 

@@ -14,6 +14,11 @@ pub const HORIZON_SESSIONS: f64 = 20.0;
 /// once. Chosen.
 const USUAL_SESSIONS: usize = 5;
 
+/// Standard error up to which an estimate counts, as a fraction of the distance to the
+/// nearer limit. Chosen: beyond it a session tells less than three standard errors of a
+/// fault.
+const WORST_ERROR_SHARE: f64 = 1.0 / 3.0;
+
 /// A servo parameter that is followed from session to session.
 ///
 /// The limits are the smallest sudden changes within a session that were confirmed in all
@@ -53,12 +58,27 @@ impl Parameter {
         }
     }
 
-    const fn of(self, estimate: &ServoEstimate) -> f64 {
+    /// Scatter of the estimates of a healthy servo from session to session: 1 or 2 % of the
+    /// gain where the motions of simulated rigs are alike, 3 % where they are of all kinds;
+    /// 0.004 to 0.009 m/s² and 5 to 10 ms.
+    const fn usual_scatter(self) -> f64 {
         match self {
-            Self::Gain => estimate.gain,
-            Self::Offset => estimate.offset_m_s2,
-            Self::Delay => estimate.delay_s,
+            Self::Gain => 0.02,
+            Self::Offset => 0.01,
+            Self::Delay => 0.01,
         }
+    }
+
+    /// Returns the estimate; NaN if its error is too large to tell a drift.
+    fn of(self, estimate: &ServoEstimate) -> f64 {
+        let (value, error) = match self {
+            Self::Gain => (estimate.gain, estimate.gain_error),
+            Self::Offset => (estimate.offset_m_s2, estimate.offset_error_m_s2),
+            Self::Delay => (estimate.delay_s, estimate.delay_error_s),
+        };
+        let band = self.band();
+        let room = (band.high - band.nominal).min(band.nominal - band.low);
+        if error <= WORST_ERROR_SHARE * room { value } else { f64::NAN }
     }
 }
 
@@ -76,8 +96,8 @@ pub struct Drift {
 /// Returns the drift of `parameter` over sessions, oldest first, with the estimates of
 /// each; `None` for too few sessions.
 ///
-/// Estimates are more repeatable than accurate: stiction and the control loop shift all
-/// of them alike, by up to their standard error. Hence the first sessions, not the
+/// Estimates are more repeatable than accurate: stiction and the control loop shift all of
+/// them alike, by more than their standard errors. Hence the first sessions, not the
 /// calibration, define the usual value, and later sessions should ask the rig for motions
 /// of the same kind.
 #[must_use]
@@ -85,7 +105,7 @@ pub fn drift(parameter: Parameter, sessions: &[Option<ServoEstimate>]) -> Option
     let sessions = &sessions[sessions.len().saturating_sub(MAX_SESSIONS)..];
     let value = |e: &Option<ServoEstimate>| e.as_ref().map_or(f64::NAN, |e| parameter.of(e));
     let values: Vec<f64> = sessions.iter().map(value).collect();
-    let mut trend = Trend::of(&values)?;
+    let mut trend = Trend::of(&values, parameter.usual_scatter())?;
     let (usual, error) = usual(&values)?;
     trend.level_error = trend.level_error.hypot(error);
     let band = parameter.band().about(usual);

@@ -8,7 +8,7 @@ export function TrendCharts({ trends: { trends, points, calibration_id } }: { tr
   if (!trends.length)
     return (
       <p class="quiet">
-        {estimated.length} of 7 sessions so far. A session counts if the ball moves for 20 s of it, once it
+        {estimated.length} of 6 sessions so far. A session counts if the ball moves for 10 s of it, once it
         has ended.
       </p>
     );
