@@ -262,6 +262,22 @@ fn validate_one_pass_over_the_edge_and_after_a_push() {
     }
 }
 
+/// A plate whose acceleration jumps throws a ball that rolls, and one that slips: the damper
+/// holds it until its depth is gone.
+#[test]
+fn validate_one_pass_where_the_plate_throws_the_ball() {
+    let step = |to, start, duration| Term::Smoothstep { to, start, duration };
+    let rolls = Law::new(&[Term::Constant(-0.264), step(-1.275, 0.317, 0.249)]);
+    let slips = [step(1.033, 0.062, 0.505), step(1.137, 0.442, 0.269)];
+    for (friction, laws) in [
+        (0.8, Laws::new(rolls, Law::default(), Vec::new())),
+        (0.35, Laws::new(Law::new(&[step(0.661, 0.434, 0.129)]), Law::new(&slips), Vec::new())),
+    ] {
+        let contact = Contact::new(8e5, 1000.0, friction, 1e-4).unwrap();
+        keeps(&(on_the_chapters_plate(contact, 1.0), laws), &[1e-2, 1e-3, 1e-4], 0.01);
+    }
+}
+
 /// Balls and blocks that fall onto a hard plate, slip and spin, at several frictions.
 #[test]
 fn validate_one_pass_on_bodies_that_start_slipping_or_above_the_plate() {

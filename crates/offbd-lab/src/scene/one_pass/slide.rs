@@ -67,7 +67,10 @@ impl Slide<'_> {
         let start = contact.without_creep(&left.motion)?;
         let mut tried = drive.clone();
         let most_m = self.tolerance_m - self.from.error_m;
-        let mut bound = SlideBound { contact, most_m, bound: ErrorBound::default(), last: None };
+        let depth = contact.body.rest_height_m() - left.motion.position.z;
+        let carried = depth / contact.sag_per_normal;
+        let bound = ErrorBound::default();
+        let mut bound = SlideBound { contact, most_m, carried, bound, last: None };
         let from = (left.at_s, &start, contact.lag);
         let mut run = runner.sliding_from(from, &mut tried, None, &mut bound).ok()?;
         run.statistics.method_error_m += bound.bound.after(0.0);
@@ -156,6 +159,8 @@ struct SlideBound {
     contact: StiffContact,
     /// Bound at which the run ends, m.
     most_m: f64,
+    /// Normal force per mass that the contact carries at the start, m/s².
+    carried: f64,
     bound: ErrorBound,
     last: Option<Last>,
 }
@@ -289,10 +294,7 @@ impl<'p, D: Drive> StepObserver<DrivenSliding<'p, D>, 9> for SlideBound {
                 let held = if last.normal < 0.0 { last.duration } else { self.contact.lag };
                 self.thrown(n[0], last.normal, self.contact.lag - held)
             }
-            (None, Phase::Flight) => {
-                let depth = self.contact.body.rest_height_m() - y[0][2];
-                self.thrown(n[0], depth / self.contact.sag_per_normal, 0.0)
-            }
+            (None, Phase::Flight) => self.thrown(n[0], self.carried, 0.0),
             _ => WindowError::default(),
         };
         added.position += change.position;
