@@ -35,8 +35,10 @@ const MOVING_M: f64 = 0.002;
 /// Time without a block after which a window starts again, s: three readings of a slow
 /// sensor.
 const BREAK_S: f64 = 0.6;
-/// Number of recent windows: together 38 s of motion, in 3 kB. Chosen.
+/// Number of recent windows: together 38 s of motion, in 5 kB. Chosen.
 const MAX_RECENT: usize = 32;
+/// Number of windows by which the room for recent ones grows. Chosen.
+const GROWTH: usize = 4;
 /// Fraction of the recent windows that counts; the others may hold pushes: that of a
 /// calibration.
 const KEPT: f64 = 0.8;
@@ -200,6 +202,10 @@ impl LeastSquares {
             self.blocks.drain(..third);
             return;
         }
+        if self.recent.len() == self.recent.capacity() {
+            // Each rig has them: they do not double.
+            self.recent.reserve_exact(GROWTH);
+        }
         self.recent.push_back(PathWindow::of(&self.blocks));
         self.blocks.clear();
         if self.recent.len() > MAX_RECENT {
@@ -304,7 +310,8 @@ mod tests {
     #[test]
     fn validate_parameters_against_closed_forms() {
         let late = |t: f64| ((2.0 * t).sin() - (2.0 * (t - 0.01)).sin()) / 4.0;
-        let cases: [(&dyn Fn(f64) -> f64, [f64; 3]); 3] = [
+        type Deviation<'a> = &'a dyn Fn(f64) -> f64;
+        let cases: [(Deviation<'_>, [f64; 3]); 3] = [
             (&|t| 0.05 * t * t + 0.3 * t, [0.1, 1.0, 0.0]),
             (&|t| (2.0 * t).sin() / 8.0 - 1.0, [0.0, 0.5, 0.0]),
             (&late, [0.0, 1.0, 0.01]),
