@@ -278,7 +278,8 @@ impl LeastSquares {
         let mut found = Vector3::zeros();
         for _ in 0..TRIM_ROUNDS {
             let mut left = self.recent.map(|window| window.unexplained_m2(&found));
-            let usual = median(&mut left.clone()[..n]).unwrap_or(0.0);
+            let mut sorted = left;
+            let usual = median(&mut sorted[..n]).unwrap_or(0.0);
             for (left, window) in left.iter_mut().zip(&self.recent) {
                 *left /= usual + MOTION_SHARE * f64::from(window.motion_m2);
             }
