@@ -63,7 +63,7 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 5;
+pub const JUDGEMENT: u32 = 4;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
@@ -120,12 +120,6 @@ impl Engine {
     #[must_use]
     pub fn with_trial(self, trial: &Trial) -> Self {
         Self { pipeline: self.pipeline.with_trial(trial), ..self }
-    }
-
-    /// Takes the session as healthy, as a calibration does; only for an engine that has taken
-    /// no input and is not serialised.
-    fn assuming_health(self) -> Self {
-        Self { pipeline: self.pipeline.assuming_health(), ..self }
     }
 
     /// The rig, settings and twin of this engine.

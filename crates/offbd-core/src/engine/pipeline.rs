@@ -75,10 +75,6 @@ pub(super) struct Pipeline {
     /// Other debounce times than those of the settings. What has some is not serialised.
     #[serde(skip)]
     trial: Trial,
-    /// Whether the session is healthy by assumption, as those of a calibration are: no
-    /// failure of a servo is then held against it. What has it set is not serialised.
-    #[serde(skip)]
-    assumed_healthy: bool,
 }
 
 impl Pipeline {
@@ -142,13 +138,7 @@ impl Pipeline {
             n_judged: 0,
             clock_set_back: false,
             trial: Trial::default(),
-            assumed_healthy: false,
         }
-    }
-
-    /// Takes the session as healthy: what a servo does is learnt, whatever it is.
-    pub(super) fn assuming_health(self) -> Self {
-        Self { assumed_healthy: true, ..self }
     }
 
     /// Tries other limits and debounce times.
@@ -551,13 +541,6 @@ impl Pipeline {
                 false => qualified.min(Qualified::Failed),
             };
             watch.apply(code, qualified, settings, &self.evidence, memory, transitions);
-            if let Some(axis) = code.axis() {
-                match qualified {
-                    Qualified::Tripped if !self.assumed_healthy => self.servos[axis].hold(),
-                    Qualified::Passed => self.servos[axis].release(),
-                    _ => {}
-                }
-            }
             let failed = match qualified {
                 Qualified::Tripped => true,
                 // Evidence continues to accumulate until it confirms.

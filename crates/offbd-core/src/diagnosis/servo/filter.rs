@@ -55,21 +55,12 @@ const PUSH_NATS: f64 = 1.0;
 /// Standard deviation of the deviation's rate at the start, m/s. Chosen.
 const START_DEVIATION_M_S: f64 = 0.5;
 
-/// The parameters that a filter has learnt, and their covariance.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub(super) struct ServoKnowledge {
-    parameters: [f64; PARAMETERS],
-    covariance: [[f64; PARAMETERS]; PARAMETERS],
-}
-
 /// The filter. The covariance is in m, m/s and the units of the parameters.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct ServoFilter {
     prior: ParameterPrior,
     state: [f64; STATES],
     covariance: [[f64; STATES]; STATES],
-    /// Whether the parameters neither learn nor change.
-    held: bool,
 }
 
 impl ServoFilter {
@@ -80,7 +71,7 @@ impl ServoFilter {
         for (k, deviation) in prior.deviation.into_iter().enumerate() {
             covariance[2 + k][2 + k] = deviation * deviation;
         }
-        Self { prior, state: [0.0; STATES], covariance, held: false }
+        Self { prior, state: [0.0; STATES], covariance }
     }
 
     /// Starts from the deviation `y` with variance `variance`, after a time without
@@ -107,30 +98,6 @@ impl ServoFilter {
         (self.state[2 + k], self.covariance[2 + k][2 + k])
     }
 
-    /// What was learnt of the parameters.
-    pub(super) fn knowledge(&self) -> ServoKnowledge {
-        let parameters = core::array::from_fn(|k| self.state[2 + k]);
-        ServoKnowledge { parameters, covariance: self.spread() }
-    }
-
-    /// Returns the parameters to `known` and keeps them there. They still add to the
-    /// uncertainty of the path, but learn nothing from it (a consider filter, Schmidt 1966).
-    pub(super) fn hold(&mut self, known: &ServoKnowledge) {
-        self.held = true;
-        for i in 0..PARAMETERS {
-            self.state[2 + i] = known.parameters[i];
-            for j in 0..2 {
-                (self.covariance[2 + i][j], self.covariance[j][2 + i]) = (0.0, 0.0);
-            }
-            self.covariance[2 + i][2..].copy_from_slice(&known.covariance[i]);
-        }
-    }
-
-    /// Lets the parameters learn again.
-    pub(super) const fn release(&mut self) {
-        self.held = false;
-    }
-
     /// Covariance of the parameters.
     pub(super) fn spread(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         core::array::from_fn(|i| core::array::from_fn(|j| self.covariance[2 + i][2 + j]))
@@ -139,9 +106,7 @@ impl ServoFilter {
     /// Predicts the state over `step`.
     pub(super) fn predict(&mut self, step: &FilterStep) {
         let FilterStep { dt, forcing, density } = *step;
-        let held = self.held;
-        let keep =
-            self.prior.memory_s.map(|memory_s| if held { 1.0 } else { memory_s / (memory_s + dt) });
+        let keep = self.prior.memory_s.map(|memory_s| memory_s / (memory_s + dt));
         let x = &mut self.state;
         let forced = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
             (0..PARAMETERS).map(|k| forcing[k][row] * of(2 + k)).sum()
@@ -190,14 +155,11 @@ impl ServoFilter {
     /// The Kalman update for an innovation of variance `s` whose covariance with the
     /// state is `row`.
     fn update(&mut self, row: &[f64; STATES], innovation: f64, s: f64) {
-        let learnt = if self.held { 2 } else { STATES };
         for i in 0..STATES {
             let gain = row[i] / s;
-            if i < learnt {
-                self.state[i] += gain * innovation;
-            }
-            for (j, shared) in row.iter().enumerate().filter(|(j, _)| i.min(*j) < learnt) {
-                self.covariance[i][j] -= gain * shared;
+            self.state[i] += gain * innovation;
+            for (covariance, shared) in self.covariance[i].iter_mut().zip(row) {
+                *covariance -= gain * shared;
             }
         }
     }

@@ -30,7 +30,7 @@ pub use estimate::ServoEstimate;
 use serde::{Deserialize, Serialize};
 
 use block::{BlockBuilder, ReadingBlock};
-use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter, ServoKnowledge};
+use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
 use least_squares::LeastSquares;
 use path_error::PathError;
 
@@ -181,11 +181,6 @@ pub struct ServoFilterBank {
     /// Time of motion followed since the session began or a gap ended, s.
     followed_s: f64,
     steady_m_s2: f64,
-    /// What was known of the healthy servo, and the session's offset, m/s², when the
-    /// evidence last was zero.
-    before: (ServoKnowledge, f64),
-    /// Whether the healthy hypothesis keeps to that: the servo's fault is confirmed.
-    held: bool,
     least_squares: LeastSquares,
     path: PathError,
 }
@@ -193,20 +188,17 @@ pub struct ServoFilterBank {
 impl ServoFilterBank {
     #[must_use]
     pub fn new(prior: AxisPrior) -> Self {
-        let healthy = ServoFilter::new(prior.parameters());
         Self {
             prior,
             builder: BlockBuilder::default(),
             last: None,
-            healthy,
+            healthy: ServoFilter::new(prior.parameters()),
             faulty: ServoFilter::new(FAULTY),
             nats: 0.0,
             rising_since: None,
             log_likelihood_nats: 0.0,
             followed_s: 0.0,
             steady_m_s2: 0.0,
-            before: (healthy.knowledge(), 0.0),
-            held: false,
             least_squares: LeastSquares::default(),
             path: PathError::default(),
         }
@@ -242,10 +234,8 @@ impl ServoFilterBank {
         let healthy = self.healthy.correct(y, variance, dt);
         self.log_likelihood_nats += healthy;
         self.followed_s += dt;
-        if !self.held {
-            let share = dt / self.followed_s.min(STEADY_S);
-            self.steady_m_s2 += share * (self.healthy.parameter(0).0 - self.steady_m_s2);
-        }
+        let share = dt / self.followed_s.min(STEADY_S);
+        self.steady_m_s2 += share * (self.healthy.parameter(0).0 - self.steady_m_s2);
         if self.followed_s < SETTLED_S {
             return;
         }
@@ -254,28 +244,6 @@ impl ServoFilterBank {
             true => self.rising_since.or(Some(last.t)),
             false => None,
         };
-        if self.nats == 0.0 && !self.held {
-            self.before = (self.healthy.knowledge(), self.steady_m_s2);
-        }
-    }
-
-    /// The fault of the servo is confirmed: until [`release`](Self::release) the healthy
-    /// hypothesis keeps to what was known before its evidence rose. It would else learn a
-    /// fault that lasts, which would pass its test, and take its end for another fault.
-    pub fn hold(&mut self) {
-        if self.held {
-            return;
-        }
-        self.held = true;
-        let (known, steady_m_s2) = self.before;
-        self.healthy.hold(&known);
-        self.steady_m_s2 = steady_m_s2;
-    }
-
-    /// The fault of the servo is over: the healthy hypothesis learns again.
-    pub const fn release(&mut self) {
-        self.held = false;
-        self.healthy.release();
     }
 
     /// Stops following the ball, which cannot respond or was not seen. The estimates of
@@ -299,7 +267,6 @@ impl ServoFilterBank {
     /// Resets the evidence: another cause explains it.
     pub fn exonerate(&mut self) {
         self.pause();
-        self.release();
         self.path.clear();
         self.faulty = ServoFilter::new(FAULTY);
         (self.nats, self.rising_since) = (0.0, None);
@@ -351,8 +318,6 @@ impl ServoFilterBank {
     #[must_use]
     pub fn least_pull_m_s2(&self, twin_m_s2: f64) -> f64 {
         let (offset, variance) = self.healthy.parameter(0);
-        // A slipped horn changes what the plate demands as the session's level does.
-        let offset = if self.held { self.faulty.parameter(0).0 } else { offset };
         ((twin_m_s2 + offset).abs() - LEVEL_ERRORS * variance.sqrt()).max(0.0)
     }
 

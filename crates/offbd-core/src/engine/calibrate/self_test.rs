@@ -46,7 +46,7 @@ pub(super) struct Accusation {
 
 /// Judges `samples`, session number `session`, with `setup`.
 pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTest {
-    let mut engine = Engine::new(setup.clone(), FaultMemory::default()).assuming_health();
+    let mut engine = Engine::new(setup.clone(), FaultMemory::default());
     let (mut transitions, mut alarm, mut most_outliers) = (Vec::new(), None, 0.0_f64);
     let (mut scatter, mut nats) = (SustainedMaximum::default(), PerAxis::<(f64, f64)>::default());
     for &sample in samples {
