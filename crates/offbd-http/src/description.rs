@@ -186,7 +186,7 @@ fn add_responses(operation: &mut Operation) {
     }
 }
 
-/// Describes the values of `If-Match`; in a header there is no null.
+/// Describes the values of `If-Match`, without null: a header is a text or is absent.
 fn describe_if_match(parameter: &mut RefOr<Parameter>) {
     if let RefOr::T(parameter) = parameter
         && parameter.name == "If-Match"

@@ -236,8 +236,7 @@ impl<'a> SceneRunner<'a> {
     where
         W: for<'p> StepObserver<DrivenSliding<'p, D>, 9>,
     {
-        let integration = self.integration(self.scene.initial.to_row(), samples);
-        self.sliding_on(integration, 0.0, drive, observer)
+        self.sliding_from((0.0, &self.scene.initial, 0.0), drive, samples, observer)
     }
 
     /// Runs the sliding model from a motion on, as [`Self::compliant_from`], with a damper
@@ -252,23 +251,11 @@ impl<'a> SceneRunner<'a> {
     where
         W: for<'p> StepObserver<DrivenSliding<'p, D>, 9>,
     {
-        let integration = Integration { t: from_s, ..self.integration(start.to_row(), samples) };
-        self.sliding_on(integration, hold_s, drive, observer)
-    }
-
-    fn sliding_on<D: Drive, W>(
-        &self,
-        mut integration: Integration<'_, '_, 9>,
-        hold_s: f64,
-        drive: &mut D,
-        observer: &mut W,
-    ) -> Result<RunOutcome, Failure>
-    where
-        W: for<'p> StepObserver<DrivenSliding<'p, D>, 9>,
-    {
         let body = self.scene.body();
         let model = Sliding::new(body, self.scene.contact.friction(), self.scene.ground());
         let mut sequence = PhaseTracker::new(hold_s);
+        let mut integration =
+            Integration { t: from_s, ..self.integration(start.to_row(), samples) };
         let (mut control, budget) = (self.control(drive), self.budget());
         let motion = |_: &D, _: f64, y: &[f64; 9]| Motion::from_row(y);
         let end = self.pieces(drive, &mut integration, motion, |drive, integration, until| {

@@ -110,8 +110,8 @@ impl PathSums {
     }
 }
 
-/// The sums of one window, as in [`PathSums`]. Single precision: its error is below that of
-/// readings to a ten-thousandth of the motion.
+/// The sums of one window, as in [`PathSums`]. Single precision rounds them by 6e-8, less
+/// than the share that readings to a thousandth of the motion leave unexplained, 1e-6.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct PathWindow {
     squares_m2: f32,

@@ -157,13 +157,13 @@ pub(super) struct Path<const M: usize> {
 pub(super) struct Worst {
     /// Fraction of the friction limit in use.
     pub demand: f64,
-    /// Number of nodes before the first at which the ball is not sure to roll.
-    pub sure: usize,
     /// The same at the first node, and the normal force per mass there and at the last
     /// node, m/s².
     pub first_demand: f64,
     pub first_normal: f64,
     pub last_normal: f64,
+    /// Number of nodes before the first at which the ball is not sure to roll.
+    pub sure: usize,
     /// Normal force per mass, m/s², and its smallest value.
     pub normal: f64,
     pub least_normal: f64,
