@@ -58,15 +58,16 @@ impl Agent {
         Self { child, client, log }
     }
 
-    /// Returns the reasons that were logged with `message`.
-    fn logged(&self, message: &str) -> Vec<String> {
-        let log = self.log.lock().unwrap();
-        let lines = log.iter().filter(|fields| fields["message"] == message);
-        lines.map(|fields| fields["reason"].as_str().unwrap().to_owned()).collect()
-    }
-
-    fn has_logged(&self, message: &str) -> bool {
-        self.log.lock().unwrap().iter().any(|fields| fields["message"] == message)
+    /// Waits until `message` is logged `n` times or more; returns the reasons.
+    async fn logged(&self, message: &str, n: usize) -> Vec<String> {
+        eventually(|| async {
+            let log = self.log.lock().unwrap();
+            let lines = log.iter().filter(|fields| fields["message"] == message);
+            let reasons = lines.map(|fields| fields["reason"].as_str().unwrap_or("").to_owned());
+            let reasons: Vec<String> = reasons.collect();
+            (reasons.len() >= n).then_some(reasons)
+        })
+        .await
     }
 
     async fn status(&self) -> Value {

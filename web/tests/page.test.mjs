@@ -186,8 +186,7 @@ test("the page works by keyboard, and the theme is stored", async () => {
   await view.getByRole("link", { name: /bench/ }).first().waitFor();
   await view.keyboard.press("Tab");
   assert.equal(await view.evaluate(() => document.activeElement.textContent), "Skip to the content");
-  await view.getByRole("link", { name: /bench/ }).first().focus();
-  await view.keyboard.press("Enter");
+  await view.getByRole("link", { name: /bench/ }).first().press("Enter");
   await view.getByRole("heading", { name: "Monitors" }).waitFor();
   const change = view.getByRole("button", { name: /Colours/ });
   await change.click();

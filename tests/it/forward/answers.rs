@@ -77,7 +77,7 @@ async fn a_batch_waits_until_the_service_itself_has_acknowledged_all_its_rows() 
     let lies = lies();
     let samples = rig(lies.len() * N, usize::MAX);
     for ((lie, reason), part) in lies.iter().zip(samples.chunks(N)) {
-        let n_logged = agent.logged("a batch waits").len();
+        let n_logged = agent.logged("a batch waits", 0).await.len();
         proxy.tell(Some(lie.clone()));
         agent.client.telemetry("a", Some("s"), part).await;
         proxy.has_told(2).await;
@@ -95,11 +95,7 @@ async fn a_batch_waits_until_the_service_itself_has_acknowledged_all_its_rows() 
         let status = agent.drained().await;
         assert_eq!(status["held_up"], json!([]));
         // Once, though it was told twice or more.
-        let logged = eventually(async || {
-            let logged = agent.logged("a batch waits").split_off(n_logged);
-            (!logged.is_empty()).then_some(logged)
-        });
-        let logged = logged.await;
+        let logged = agent.logged("a batch waits", n_logged + 1).await.split_off(n_logged);
         assert!(logged.len() == 1 && logged[0].contains(reason), "{reason}: {logged:?}");
     }
     assert_eq!(fixture.client.recording("a", "s").await, samples);

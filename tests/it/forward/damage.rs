@@ -50,7 +50,7 @@ async fn a_batch_with_a_changed_bit_is_set_aside_and_the_rest_is_sent() {
         assert_eq!(batch["asset"], "a");
         assert!(batch["reason"].as_str().unwrap().contains("checksum"), "{batch}");
     }
-    assert_eq!(agent.logged("a batch is damaged and set aside").len(), 2);
+    assert_eq!(agent.logged("a batch is damaged and set aside", 2).await.len(), 2);
     let intact = [&samples[..20], &samples[30..50]].concat();
     assert_eq!(fixture.client.recording("a", "s").await, intact);
     drop(agent);

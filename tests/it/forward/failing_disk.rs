@@ -79,7 +79,7 @@ async fn what_is_refused_while_the_disk_is_full_is_set_aside() {
     let agent = Agent::start_with(&spool, &proxy.url, &[], &system.environment());
     let status = agent.drained().await;
     assert_eq!(status["refused"].as_array().unwrap().len(), N_BATCHES, "{status}");
-    assert!(agent.has_logged("the disk is full; the agent takes nothing until it has room again"));
+    agent.logged("the disk is full; the agent takes nothing until it has room again", 1).await;
     assert_eq!(status["reserve_bytes"], 0);
     let refused = agent.client.post("assets/a/telemetry", &batch(Some("s"), &samples[..1])).await;
     assert!(refused.problem(503)["detail"].as_str().unwrap().contains("full"));

@@ -55,7 +55,7 @@ async fn samples_that_the_service_rejects_are_kept_with_the_reason() {
     let reason = refused[0]["reason"].as_str().unwrap();
     assert!(reason.starts_with("990 of 1000 rows rejected: row 10 and 989 more: "), "{reason}");
     assert!(reason.contains("another sample with this seq"), "{reason}");
-    assert_eq!(agent.logged("samples are rejected and set aside"), [reason]);
+    assert_eq!(agent.logged("samples are rejected and set aside", 1).await, [reason]);
     drop(agent);
     assert_eq!(listed(&spool), *refused.as_array().unwrap());
     assert_eq!(fixture.client.recording("a", "s").await, samples);
@@ -127,7 +127,7 @@ async fn refused_batches_can_be_listed_sent_again_and_removed() {
         (status["refused"].as_array().unwrap().len() == 4).then_some(())
     })
     .await;
-    assert_eq!(agent.logged("a batch is refused and set aside").len(), 4);
+    assert_eq!(agent.logged("a batch is refused and set aside", 4).await.len(), 4);
     // The file is the agent's while it runs.
     let locked = run(&spool, &["list"]);
     let told = String::from_utf8(locked.stderr).unwrap();
