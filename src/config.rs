@@ -5,8 +5,30 @@
 //! It is one typed structure, which is checked completely at the start. An error names
 //! the key. Unknown keys are errors in the file and in the environment.
 
+/// Defines a section of the configuration. The comments are the texts of the manual.
+macro_rules! section {
+    ($(#[$meta:meta])* pub struct $name:ident { $(
+        $(#[doc = $doc:literal])+ $(#[serde $serde:tt])? pub $key:ident: $type:ty,
+    )+ }) => {
+        #[derive(Clone, Debug, PartialEq, serde::Deserialize, serde::Serialize)]
+        #[serde(deny_unknown_fields)]
+        $(#[$meta])*
+        pub struct $name { $($(#[doc = $doc])+ $(#[serde $serde])? pub $key: $type),+ }
+
+        impl $name {
+            /// The name of each key and what it sets.
+            pub(crate) const KEYS: &'static [(&'static str, &'static str)] =
+                &[$((stringify!($key), concat!($($doc),+))),+];
+        }
+    };
+}
+
 mod bus;
 mod cluster;
+mod effective;
+#[cfg(test)]
+mod manual;
+mod secrets;
 
 use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
@@ -17,53 +39,69 @@ use serde::{Deserialize, Serialize};
 
 pub use self::bus::{BrokerAddress, MqttConfig, NatsConfig};
 pub use self::cluster::ClusterConfig;
+pub(crate) use self::effective::toml;
+pub use self::effective::{EffectiveKey, Source};
+pub use self::secrets::ReadableSecret;
 use offbd_service::access::jwt::ExpectedClaims;
 use offbd_service::{
-    CommunicationSettings, Limits, NotificationSettings, OutOfRange, RequestLimits, Retention,
-    TargetPolicy, WorkerLimits, config_section,
+    CommunicationSettings, Limits, NotificationSettings, NumberKey, OutOfRange, RequestLimits,
+    Retention, TargetPolicy, WorkerLimits, config_section,
 };
 use offbd_store::Location;
 
 /// Name of the database file in the data directory.
 const DATABASE_FILE: &str = "offbd.sqlite";
 
-/// The configuration of the service.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Config {
-    /// The address to listen on; with port 0, any free port.
-    pub listen: SocketAddr,
-    /// Directory of the embedded store; created if it is missing.
-    pub data: PathBuf,
-    /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; by default an SQLite
-    /// file in `data`.
-    pub database: Option<String>,
-    /// Whether requests need a token; by default only if other machines can connect.
-    pub auth: Option<Auth>,
-    /// Origins of other sites whose pages may use the interface, `https://HOST[:PORT]`.
-    pub origins: Vec<String>,
-    /// Encryption of connections; `None` for none.
-    pub tls: Option<TlsConfig>,
-    /// The identity provider whose tokens are accepted, if any.
-    pub jwt: Option<JwtConfig>,
-    /// The cluster that this process is a node of; `None` for one that works alone.
-    pub cluster: Option<ClusterConfig>,
-    /// The NATS server whose devices are served, if any.
-    pub nats: Option<NatsConfig>,
-    /// The MQTT broker whose devices are served, if any.
-    pub mqtt: Option<MqttConfig>,
-    pub log: LogConfig,
-    pub traces: TracesConfig,
-    pub limits: RequestLimits,
-    pub rates: RatesConfig,
-    pub workers: WorkerLimits,
-    pub retention: RetentionConfig,
-    pub communication: CommunicationSettings,
-    pub notifications: NotificationsConfig,
+section! {
+    /// The configuration of the service.
+    #[serde(default)]
+    pub struct Config {
+        /// The address to listen on; with port 0, any free port.
+        pub listen: SocketAddr,
+        /// Directory of the SQLite file; created if it is missing.
+        pub data: PathBuf,
+        /// `sqlite:FILE` or `postgres://USER:PASSWORD@HOST/DATABASE`; by default the SQLite file
+        /// in `data`.
+        #[serde(serialize_with = "secrets::hide_url")]
+        pub database: Option<String>,
+        /// A file with the value of `database`, for a URL with a password.
+        pub database_file: Option<PathBuf>,
+        /// `required`: requests need a token. `off` is permitted only if no other machine can
+        /// connect. By default, `required` if other machines can connect.
+        pub auth: Option<Auth>,
+        /// Other sites whose pages may use the interface, `https://HOST[:PORT]`.
+        pub origins: Vec<String>,
+        /// Encryption of connections; `None` for none.
+        pub tls: Option<TlsConfig>,
+        /// The identity provider whose tokens are accepted, if any.
+        pub jwt: Option<JwtConfig>,
+        /// The cluster that this process is a node of; `None` for one that works alone.
+        pub cluster: Option<ClusterConfig>,
+        /// The NATS server whose devices are served, if any.
+        pub nats: Option<NatsConfig>,
+        /// The MQTT broker whose devices are served, if any.
+        pub mqtt: Option<MqttConfig>,
+        /// Logs, on stderr.
+        pub log: LogConfig,
+        /// Traces of requests.
+        pub traces: TracesConfig,
+        /// Limits of requests, memory and connections.
+        pub limits: RequestLimits,
+        /// Rate limits.
+        pub rates: RatesConfig,
+        /// Threads and queues.
+        pub workers: WorkerLimits,
+        /// How long recordings are kept.
+        pub retention: RetentionConfig,
+        /// When the data of a rig count as lost.
+        pub communication: CommunicationSettings,
+        /// How notifications are sent.
+        pub notifications: NotificationsConfig,
+    }
 }
 
 /// Whether requests need a token.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Auth {
     Required,
@@ -71,34 +109,34 @@ pub enum Auth {
     Off,
 }
 
-/// Certificate and key for TLS: PEM files, which are read again when they change.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TlsConfig {
-    /// The certificate, followed by the intermediate certificates.
-    pub certificate: PathBuf,
-    /// Its private key.
-    pub key: PathBuf,
+section! {
+    /// Certificate and key for TLS: PEM files, which are read again when they change.
+    pub struct TlsConfig {
+        /// PEM file with the certificate, followed by the intermediate certificates.
+        pub certificate: PathBuf,
+        /// PEM file with its private key.
+        pub key: PathBuf,
+    }
 }
 
-/// An identity provider whose JSON Web Tokens are accepted besides the service's own
-/// tokens.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct JwtConfig {
-    /// The required `iss` claim.
-    pub issuer: String,
-    /// The required `aud` claim, or element of it.
-    pub audience: String,
-    /// The provider's public keys (JWKS): a file or an `https://` URL; `http://` is
-    /// allowed for this machine only.
-    pub jwks: String,
-    /// The claim with the role: its name, or a JSON pointer.
-    #[serde(default = "role_claim")]
-    pub role_claim: String,
-    /// The claim with the asset of a device: its name, or a JSON pointer.
-    #[serde(default = "asset_claim")]
-    pub asset_claim: String,
+section! {
+    /// An identity provider whose JSON Web Tokens are accepted besides the service's own
+    /// tokens.
+    pub struct JwtConfig {
+        /// The `iss` that a token must have.
+        pub issuer: String,
+        /// The `aud` that a token must have, or an element of it.
+        pub audience: String,
+        /// The provider's public keys (JWKS): a file or an `https://` URL; `http://` is
+        /// permitted for this machine only.
+        pub jwks: String,
+        /// The claim with the role: its name, or a JSON pointer.
+        #[serde(default = "role_claim")]
+        pub role_claim: String,
+        /// The claim with the asset of a device: its name, or a JSON pointer.
+        #[serde(default = "asset_claim")]
+        pub asset_claim: String,
+    }
 }
 
 fn role_claim() -> String {
@@ -181,31 +219,36 @@ config_section! {
     /// requests of ten seconds may come at once; further ones are answered 429 with
     /// `Retry-After`.
     RatesConfig as "rates" |_this| {
-        /// Requests with one token.
+        /// Requests with one token a second, those of ten seconds at once; then 429 with
+        /// `Retry-After`. All JSON Web Tokens of one subject count as one token.
         token_per_s: u32 = 2000, 1..=1_000_000;
-        /// Requests from one address without a token, or with one that was not used recently.
+        /// The same of one address, for requests without a token and with one that was not used
+        /// in the last 5 s.
         address_per_s: u32 = 500, 1..=1_000_000;
     }
 }
 
-/// Logs, on stderr.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogConfig {
-    pub format: LogFormat,
-    /// A filter directive of `tracing`: `info`, `offbd=debug,info`, …
-    pub level: String,
+section! {
+    /// Logs, on stderr.
+    #[serde(default)]
+    pub struct LogConfig {
+        /// `text`, or `json` for one object per line.
+        pub format: LogFormat,
+        /// A filter such as `info`, or `offbd=debug,info`.
+        pub level: String,
+    }
 }
 
-/// Traces for OpenTelemetry, by OTLP over HTTP; none without an endpoint.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TracesConfig {
-    /// `http://HOST:PORT` of a collector, which should run on this machine: the
-    /// connection to it is not encrypted.
-    pub endpoint: Option<String>,
-    /// The share of requests that are traced, 0 to 1.
-    pub share: f64,
+section! {
+    /// Traces for OpenTelemetry, by OTLP over HTTP; none without an endpoint.
+    #[serde(default)]
+    pub struct TracesConfig {
+        /// `http://HOST:PORT` of an OpenTelemetry collector. It should run on this machine: the
+        /// connection to it is not encrypted.
+        pub endpoint: Option<String>,
+        /// The share of requests that are traced, 0 to 1.
+        pub share: f64,
+    }
 }
 
 impl Default for TracesConfig {
@@ -244,36 +287,42 @@ pub enum LogFormat {
     Json,
 }
 
-/// How long recordings are kept; without a limit, for ever. See [`Retention`].
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RetentionConfig {
-    /// Days for which an ended session is kept in which no fault changed its status.
-    pub days: Option<usize>,
-    /// Stored bytes of the ended sessions of one asset.
-    pub bytes_per_asset: Option<usize>,
-    /// Days for which an ended session is kept in which a fault changed its status.
-    pub fault_days: Option<usize>,
-    /// Interval between two sweeps, s.
-    pub sweep_s: u64,
+section! {
+    /// How long recordings are kept; without a limit, for ever. See [`Retention`].
+    #[serde(default)]
+    pub struct RetentionConfig {
+        /// Days after which an ended session is deleted in which no fault changed its status; by
+        /// default never.
+        pub days: Option<usize>,
+        /// Days after which an ended session is deleted in which a fault changed its status, not
+        /// below `retention.days`; by default never.
+        pub fault_days: Option<usize>,
+        /// Stored bytes of the ended sessions of one asset, above which the oldest are deleted;
+        /// by default no limit.
+        pub bytes_per_asset: Option<usize>,
+        /// Time between two sweeps, s.
+        pub sweep_s: u64,
+    }
 }
 
-/// How notifications are sent. See [`NotificationSettings`].
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct NotificationsConfig {
-    /// Address of the dashboard for links in messages: `https://HOST[:PORT]`.
-    pub public_url: Option<String>,
-    /// Patterns of the hosts to which messages may be sent, with `*` and `?`; all if empty.
-    pub targets: Vec<String>,
-    /// Whether messages may be sent to private and loopback addresses.
-    pub private_addresses: bool,
-    /// Time limit of one attempt, s.
-    pub timeout_s: u64,
-    /// Delay after the first failed attempt, s; it doubles with each further one.
-    pub first_retry_s: u64,
-    /// Age at which a message is given up, s.
-    pub give_up_after_s: u64,
+section! {
+    /// How notifications are sent. See [`NotificationSettings`].
+    #[serde(default)]
+    pub struct NotificationsConfig {
+        /// Address of the dashboard for links in messages, `https://HOST[:PORT]`.
+        pub public_url: Option<String>,
+        /// Patterns of the hosts to which messages may be sent, with `*` and `?`; all if empty.
+        pub targets: Vec<String>,
+        /// Whether messages may be sent to private and loopback addresses.
+        pub private_addresses: bool,
+        /// Time limit of one attempt, s.
+        pub timeout_s: u64,
+        /// Delay after the first failed attempt, s; it doubles with each further one, up to an
+        /// hour.
+        pub first_retry_s: u64,
+        /// Age at which a message is given up, s.
+        pub give_up_after_s: u64,
+    }
 }
 
 impl Default for NotificationsConfig {
@@ -358,6 +407,7 @@ impl Default for Config {
             listen: SocketAddr::from(([127, 0, 0, 1], 8087)),
             data: PathBuf::from("offbd-data"),
             database: None,
+            database_file: None,
             auth: None,
             origins: Vec::new(),
             tls: None,
@@ -391,6 +441,19 @@ pub struct Flags {
     pub database: Option<String>,
 }
 
+impl Flags {
+    /// The keys that are set.
+    fn names(&self) -> Vec<&'static str> {
+        let Self { listen, data, database } = self;
+        let set = [
+            ("listen", listen.is_some()),
+            ("data", data.is_some()),
+            ("database", database.is_some()),
+        ];
+        set.into_iter().filter_map(|(name, is_set)| is_set.then_some(name)).collect()
+    }
+}
+
 /// Why a configuration is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -414,7 +477,7 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] with the first invalid key.
     pub fn load(file: Option<&Path>, flags: &Flags) -> Result<Self, ConfigError> {
-        Self::from_sources(file, Environment::with_prefix("OFFBD"), flags)
+        Self::from_sources(file, environment(), flags)
     }
 
     fn from_sources(
@@ -424,15 +487,11 @@ impl Config {
     ) -> Result<Self, ConfigError> {
         let mut builder = config::Config::builder();
         if let Some(file) = file {
-            builder = builder.add_source(File::from(file).format(FileFormat::Toml));
+            builder = builder.add_source(toml_file(file));
         }
-        let environment = environment.prefix_separator("_").separator("__").try_parsing(true);
-        let environment = environment
-            .list_separator(",")
-            .with_list_parse_key("origins")
-            .with_list_parse_key("notifications.targets");
         let mut config: Self = builder.add_source(environment).build()?.try_deserialize()?;
         config.override_with(flags);
+        config.read_secrets()?;
         config.check()?;
         Ok(config)
     }
@@ -446,6 +505,7 @@ impl Config {
         }
         if flags.database.is_some() {
             self.database.clone_from(&flags.database);
+            self.database_file = None;
         }
     }
 
@@ -454,12 +514,12 @@ impl Config {
     /// # Errors
     /// [`ConfigError::Invalid`] with the first invalid key.
     pub fn check(&self) -> Result<(), ConfigError> {
-        self.limits.check()?;
-        self.rates.check()?;
+        NumberKey::check_all(&self.limits.numbers())?;
+        NumberKey::check_all(&self.rates.numbers())?;
         let requires_token = self.requires_token()?;
         self.jwt.as_ref().map_or(Ok(()), |jwt| jwt.check(requires_token))?;
         self.origins.iter().try_for_each(|origin| check_origin(origin))?;
-        self.workers.check()?;
+        NumberKey::check_all(&self.workers.numbers())?;
         if let Err(error) = self.log.level.parse::<tracing_subscriber::EnvFilter>() {
             return Err(ConfigError::Invalid { key: "log.level", reason: error.to_string() });
         }
@@ -467,7 +527,7 @@ impl Config {
         self.nats.as_ref().map_or(Ok(()), NatsConfig::check)?;
         self.mqtt.as_ref().map_or(Ok(()), |mqtt| mqtt.check(self.nats.is_some()))?;
         self.retention.check()?;
-        self.communication.check()?;
+        NumberKey::check_all(&self.communication.numbers())?;
         self.notifications.check()?;
         let location = self.location()?;
         self.cluster.as_ref().map_or(Ok(()), |cluster| cluster.check(&location))
@@ -516,6 +576,20 @@ impl Config {
     }
 }
 
+fn toml_file(file: &Path) -> File<config::FileSourceFile, FileFormat> {
+    File::from(file).format(FileFormat::Toml)
+}
+
+/// The variables of the environment: `OFFBD_` and the key, with two underscores behind a section.
+fn environment() -> Environment {
+    let environment = Environment::with_prefix("OFFBD").prefix_separator("_").separator("__");
+    environment
+        .try_parsing(true)
+        .list_separator(",")
+        .with_list_parse_key("origins")
+        .with_list_parse_key("notifications.targets")
+}
+
 /// Checks that `origin` is written as browsers do (RFC 6454, section 6.1).
 fn check_origin(origin: &str) -> Result<(), ConfigError> {
     if is_origin(origin) {
@@ -551,12 +625,108 @@ mod tests {
 
     use super::*;
 
-    fn load(toml: &str, environment: &[(&str, &str)], flags: &Flags) -> Result<Config, String> {
+    fn file(toml: &str) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
         file.write_all(toml.as_bytes()).unwrap();
-        let pairs = environment.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
-        let source = Environment::with_prefix("OFFBD").source(Some(HashMap::from_iter(pairs)));
-        Config::from_sources(Some(file.path()), source, flags).map_err(|e| e.to_string())
+        file
+    }
+
+    fn variables(pairs: &[(&str, &str)]) -> Environment {
+        let pairs = pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
+        environment().source(Some(HashMap::from_iter(pairs)))
+    }
+
+    fn load(toml: &str, pairs: &[(&str, &str)], flags: &Flags) -> Result<Config, String> {
+        let loaded = Config::from_sources(Some(file(toml).path()), variables(pairs), flags);
+        loaded.map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn the_source_of_each_value_is_told_and_no_secret() {
+        let toml = "listen = '127.0.0.1:1'\ndata = 'file'\n[mqtt]\nurl = 'mqtt://a'\n";
+        let secret = file("hunter2\n");
+        let environment = variables(&[
+            ("OFFBD_DATABASE", "postgres://u:hunter2@h/d"),
+            ("OFFBD_LIMITS__ASSETS", "7"),
+            ("OFFBD_MQTT__USER", "u"),
+            ("OFFBD_MQTT__PASSWORD_FILE", secret.path().to_str().unwrap()),
+        ]);
+        let flags = Flags { listen: Some(([127, 0, 0, 1], 3).into()), ..Flags::default() };
+        let file = file(toml);
+        let keys = Config::effective_of(Some(file.path()), environment, &flags).unwrap();
+        let text = effective::toml(&keys);
+        assert!(!text.contains("hunter2"), "{text}");
+        let path = file.path().display();
+        for (setting, source) in [
+            ("listen = \"127.0.0.1:3\"", "--listen"),
+            ("data = \"file\"", &path.to_string()),
+            ("database = \"postgres://h:5432/d\"", "OFFBD_DATABASE"),
+            ("# auth =", "not set"),
+            ("assets = 7", "OFFBD_LIMITS__ASSETS"),
+            ("connections = 16384", "default"),
+            ("url = \"mqtt://a\"", &path.to_string()),
+            ("password = \"(hidden)\"", "OFFBD_MQTT__PASSWORD_FILE"),
+        ] {
+            let line = format!("{setting:<46} # {source}");
+            assert!(text.lines().any(|told| told == line), "{line}: {text}");
+        }
+        assert!(text.contains("\n[mqtt]\n") && !text.contains("[nats]"), "{text}");
+        // What is printed can be read again.
+        let printed = self::file(&text.replace("(hidden)", "x").replace("password_file", "#"));
+        let environment = variables(&[]);
+        let again = Config::from_sources(Some(printed.path()), environment, &Flags::default());
+        assert_eq!(again.unwrap().limits.assets, 7);
+    }
+
+    #[test]
+    fn secrets_are_read_from_files() {
+        let secret = file("hunter2\r\n");
+        let path = secret.path().to_str().unwrap();
+        let url = file("postgres://u:hunter2@h/d\n");
+        let toml = format!(
+            "database_file = '{}'\n[mqtt]\nurl = 'mqtt://a'\nuser = 'u'\npassword_file = '{path}'\n\
+             [nats]\nurl = 'nats://a'\nuser = 'u'\npassword_file = '{path}'",
+            url.path().display()
+        );
+        let config = load(&toml, &[], &Flags::default()).unwrap();
+        let password = || Some("hunter2".to_owned());
+        assert_eq!(config.database.as_deref(), Some("postgres://u:hunter2@h/d"));
+        assert_eq!(config.nats.as_ref().unwrap().password, password());
+        assert_eq!(config.mqtt.as_ref().unwrap().password, password());
+        // A flag overrides the file too.
+        let flags = Flags { database: Some("sqlite:x".to_owned()), ..Flags::default() };
+        assert_eq!(load(&toml, &[], &flags).unwrap().database.as_deref(), Some("sqlite:x"));
+        for (variable, value, key, reason) in [
+            ("OFFBD_NATS__PASSWORD", "x", "nats.password_file", "is set besides `nats.password`"),
+            ("OFFBD_DATABASE_FILE", "/nowhere", "database_file", "cannot be read: /nowhere"),
+            ("OFFBD_MQTT__PASSWORD_FILE", "/dev/null", "mqtt.password_file", "an empty file"),
+        ] {
+            let error = load(&toml, &[(variable, value)], &Flags::default()).unwrap_err();
+            assert!(error.contains(&format!("`{key}`")) && error.contains(reason), "{error}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn secrets_that_everybody_can_read_are_told() {
+        use std::os::unix::fs::PermissionsExt;
+        let secret = file("hunter2");
+        let toml =
+            format!("[mqtt]\nurl = 'mqtt://a'\nuser = 'u'\n{{}} = '{}'", secret.path().display());
+        let told = |key: &str, mode| {
+            let own = file(&toml.replace("{}", key));
+            for path in [own.path(), secret.path()] {
+                std::fs::set_permissions(path, std::fs::Permissions::from_mode(mode)).unwrap();
+            }
+            let config =
+                Config::from_sources(Some(own.path()), variables(&[]), &Flags::default()).unwrap();
+            let told = config.readable_secrets(Some(own.path()));
+            told.into_iter().map(|secret| secret.key).collect::<Vec<_>>()
+        };
+        assert_eq!(told("password_file", 0o644), [Some("mqtt.password_file")]);
+        assert_eq!(told("password", 0o644), [None]);
+        assert_eq!(told("password_file", 0o640), []);
+        assert_eq!(told("password", 0o600), []);
     }
 
     #[test]

@@ -6,6 +6,8 @@ mod advertised;
 mod allocator;
 mod buses;
 mod connections;
+#[cfg(feature = "otel")]
+mod conventions;
 mod delivery;
 mod keys;
 mod listen;

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::config::{Config, ConfigError, Flags, LogConfig, LogFormat};
+use crate::config::{self, Config, ConfigError, Flags, LogConfig, LogFormat, ReadableSecret};
 use crate::server::{self, ConfigSummary, Traces};
 use offbd_store::CheckReport;
 use offbd_terminal::logging::LoggingArgs;
@@ -34,8 +34,16 @@ pub(super) struct ConfigArgs {
 impl ConfigArgs {
     /// Loads and checks the configuration.
     pub(super) fn load(&self) -> Result<Config, ConfigError> {
+        Config::load(self.config.as_deref(), &self.flags())
+    }
+
+    fn flags(&self) -> Flags {
         let Self { listen, data, database, .. } = self.clone();
-        Config::load(self.config.as_deref(), &Flags { listen, data, database })
+        Flags { listen, data, database }
+    }
+
+    fn readable_secrets(&self, config: &Config) -> Vec<ReadableSecret> {
+        config.readable_secrets(self.config.as_deref())
     }
 }
 
@@ -46,7 +54,8 @@ impl ConfigArgs {
 #[derive(Clone, Debug, Args)]
 #[command(
     after_help = "Every key of the configuration can be set by the environment: OFFBD_LISTEN,\n\
-    OFFBD_LIMITS__BATCH_SAMPLES, ... `offbd check` shows the result.\n\n\
+    OFFBD_LIMITS__BATCH_SAMPLES, ... `offbd check --print` shows the values that\n\
+    apply.\n\n\
     Examples:\n  \
     offbd serve\n  \
     offbd serve --listen 0.0.0.0:8087 --data /var/lib/offbd --log-format json\n  \
@@ -76,6 +85,7 @@ pub(super) struct MigrateArgs {
 /// Nothing is changed, and the service may be running.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  offbd check --config offbd.toml\n  \
+    offbd check --config offbd.toml --print\n  \
     offbd check --data /var/lib/offbd\n  \
     offbd check --health\n\n\
     Exit status: 0 valid, 3 invalid configuration; the error names the key;\n\
@@ -85,8 +95,11 @@ pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,
     /// Only ask the service that runs with this configuration whether it is ready
-    #[arg(long, conflicts_with = "format")]
+    #[arg(long, conflicts_with_all = ["format", "print"])]
     health: bool,
+    /// Only print all values that apply, as a TOML file, and where each comes from
+    #[arg(long)]
+    print: bool,
     /// Text for people, or one JSON object
     #[arg(long, value_enum, default_value_t = OutputFormat::Table)]
     format: OutputFormat,
@@ -99,8 +112,9 @@ pub(super) fn start_logging(logging: &LoggingArgs, config: &LogConfig, traces: O
 
 pub(super) fn serve(args: &ServeArgs, logging: &LoggingArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    let traces = Traces::start(&config.traces)?;
+    let traces = Traces::start(&config)?;
     start_logging(logging, &config.log, traces.as_ref());
+    args.config.readable_secrets(&config).iter().for_each(|secret| tracing::warn!("{secret}"));
     let result = offbd_terminal::block_on(server::serve(config));
     traces.iter().for_each(Traces::stop);
     result
@@ -123,6 +137,8 @@ pub(super) fn migrate(args: &MigrateArgs) -> anyhow::Result<()> {
 struct CheckResult {
     #[serde(flatten)]
     configuration: ConfigSummary,
+    /// Files with secrets that every user of this machine can read.
+    warnings: Vec<String>,
     checked: Option<CheckedStore>,
 }
 
@@ -154,13 +170,18 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     if args.health {
         return offbd_terminal::block_on(super::health::ask(&config));
     }
+    if args.print {
+        return print_keys(args);
+    }
     let configuration = server::check(&config)?;
     let is_asked = args.config.data.is_some() || args.config.database.is_some();
     let report = match is_asked {
         true => offbd_terminal::block_on(server::check_store(&config))?,
         false => None,
     };
-    let result = CheckResult { configuration, checked: report.map(CheckedStore::from) };
+    let warnings = args.config.readable_secrets(&config).iter().map(ToString::to_string).collect();
+    let checked = report.map(CheckedStore::from);
+    let result = CheckResult { configuration, warnings, checked };
     match args.format {
         OutputFormat::Json => output::print_json(&result)?,
         OutputFormat::Table => print_check(&result, is_asked)?,
@@ -170,8 +191,20 @@ pub(super) fn check(args: &CheckArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+fn print_keys(args: &CheckArgs) -> anyhow::Result<()> {
+    let keys = Config::effective(args.config.config.as_deref(), &args.config.flags())?;
+    match args.format {
+        OutputFormat::Json => output::print_json(&json!({ "keys": keys })),
+        OutputFormat::Table => output::print_line(config::toml(&keys).trim_end()),
+    }
+}
+
 fn print_check(result: &CheckResult, is_asked: bool) -> anyhow::Result<()> {
     output::print_line(&result.configuration.to_string())?;
+    result
+        .warnings
+        .iter()
+        .try_for_each(|warning| output::print_line(&format!("warning  {warning}")))?;
     let Some(store) = &result.checked else {
         return match is_asked {
             true => output::print_line("checked  nothing: there is no store yet"),

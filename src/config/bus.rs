@@ -2,9 +2,7 @@
 
 use std::path::PathBuf;
 
-use serde::Deserialize;
-
-use super::{ClusterConfig, ConfigError};
+use super::{ClusterConfig, ConfigError, secrets};
 
 /// The name by which a broker knows a service that works alone; a node's has the name of the
 /// node behind it.
@@ -13,57 +11,78 @@ const CLIENT_ID: &str = "offbd";
 /// Longest name by which a broker knows the service. Chosen: longer than that of any node.
 const MAX_CLIENT_ID: usize = 128;
 
-/// A NATS server whose devices are served.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NatsConfig {
-    /// `nats://HOST:PORT`, or `tls://HOST:PORT` for an encrypted connection; several servers of
-    /// one cluster with `,` between.
-    pub url: String,
-    /// The user that the service connects as, with `password`.
-    pub user: Option<String>,
-    pub password: Option<String>,
-    /// A file with credentials, instead of user and password.
-    pub credentials: Option<PathBuf>,
-    /// Certificates that the server's must come from, a PEM file.
-    pub ca: Option<PathBuf>,
-    /// The server's monitoring port, `http://HOST:PORT`; its settings are checked there. Several
-    /// with `,` between.
-    pub monitor: Option<String>,
-    /// Whether faults are published.
-    #[serde(default = "yes")]
-    pub faults: bool,
-    /// A file with the seed of the account key by which the server asks for the rights of
-    /// devices (auth callout).
-    pub issuer_seed: Option<PathBuf>,
-    /// The account of the server that devices are in.
-    #[serde(default = "account")]
-    pub account: String,
+section! {
+    /// A NATS server whose devices are served.
+    pub struct NatsConfig {
+        /// `nats://HOST:PORT`, or `tls://HOST:PORT` for an encrypted connection; several servers
+        /// of one cluster with `,` between.
+        pub url: String,
+        /// The user that the service connects as, with a password.
+        pub user: Option<String>,
+        /// The password of this user.
+        #[serde(serialize_with = "secrets::hide")]
+        pub password: Option<String>,
+        /// A file with this password.
+        pub password_file: Option<PathBuf>,
+        /// A file with credentials, instead of user and password.
+        pub credentials: Option<PathBuf>,
+        /// PEM file with the certificates from which the server's must come.
+        pub ca: Option<PathBuf>,
+        /// The server's monitoring, `http://HOST:PORT`, where its settings are checked; several
+        /// with `,` between.
+        pub monitor: Option<String>,
+        /// Whether faults are published.
+        #[serde(default = "yes")]
+        pub faults: bool,
+        /// A file with the seed of the account key by which the server asks for the rights of
+        /// devices (auth callout).
+        pub issuer_seed: Option<PathBuf>,
+        /// The account of the server that devices are in.
+        #[serde(default = "account")]
+        pub account: String,
+    }
 }
 
-/// An MQTT broker whose devices are served.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MqttConfig {
-    /// `mqtt://HOST[:PORT]`, or `mqtts://HOST[:PORT]` for an encrypted connection.
-    pub url: String,
-    /// The name by which the broker knows the service; two services need two. By default
-    /// `offbd`, with the name of the node behind it, as `offbd-node-1`.
-    pub client_id: Option<String>,
-    /// The user that the service connects as, with `password`.
-    pub user: Option<String>,
-    pub password: Option<String>,
-    /// Certificates that the broker's must come from, a PEM file.
-    pub ca: Option<PathBuf>,
-    /// Whether batches are taken; `false` if the broker is the NATS server of `nats`, which
-    /// delivers them already.
-    #[serde(default = "yes")]
-    pub telemetry: bool,
-    /// Whether faults are published.
-    #[serde(default = "yes")]
-    pub faults: bool,
-    /// A mapping file, for devices with topics and formats of their own.
-    pub mapping: Option<PathBuf>,
+section! {
+    /// An MQTT broker whose devices are served.
+    pub struct MqttConfig {
+        /// `mqtt://HOST[:PORT]`, or `mqtts://HOST[:PORT]` for an encrypted connection; port 1883
+        /// or 8883 by default.
+        pub url: String,
+        /// The name by which the broker knows the service: 1 to 128 letters, digits, `-`, `_` and
+        /// `.`; two services need two. By default `offbd`, and of a node with its name behind it,
+        /// as `offbd-node-1`.
+        pub client_id: Option<String>,
+        /// The user that the service connects as, with a password.
+        pub user: Option<String>,
+        /// The password of this user.
+        #[serde(serialize_with = "secrets::hide")]
+        pub password: Option<String>,
+        /// A file with this password.
+        pub password_file: Option<PathBuf>,
+        /// PEM file with the certificates from which the broker's must come; by default the roots
+        /// of this machine. With `mqtts://` only.
+        pub ca: Option<PathBuf>,
+        /// PEM file with the certificate of the service, for a broker that demands one. With
+        /// `mqtts://` and `key` only.
+        pub certificate: Option<PathBuf>,
+        /// PEM file with its private key.
+        pub key: Option<PathBuf>,
+        /// Whether batches are accepted; `false` if the broker is the NATS server of `nats`, which
+        /// delivers them already.
+        #[serde(default = "yes")]
+        pub telemetry: bool,
+        /// Whether faults are published.
+        #[serde(default = "yes")]
+        pub faults: bool,
+        /// Whether `offbd/v1/=service/CLIENT_ID/state` is `online` while the service is connected,
+        /// and `offline` afterwards (last will). The broker must permit the service to publish
+        /// there.
+        #[serde(default)]
+        pub state: bool,
+        /// A mapping file, for devices with topics and formats of their own.
+        pub mapping: Option<PathBuf>,
+    }
 }
 
 /// Host and port of a broker.
@@ -155,6 +174,12 @@ impl MqttConfig {
         if self.ca.is_some() && !self.address()?.encrypted {
             return invalid("mqtt.ca", "is set, but `mqtt.url` is not `mqtts://…`");
         }
+        if self.certificate.is_some() != self.key.is_some() {
+            return invalid("mqtt.certificate", "and `mqtt.key` are needed together");
+        }
+        if self.certificate.is_some() && !self.address()?.encrypted {
+            return invalid("mqtt.certificate", "is set, but `mqtt.url` is not `mqtts://…`");
+        }
         if self.mapping.is_some() && !self.telemetry {
             return invalid("mqtt.mapping", "is set, but `mqtt.telemetry` is false");
         }
@@ -218,6 +243,7 @@ mod tests {
             url: "nats://a:4222,tls://b".to_owned(),
             user: None,
             password: None,
+            password_file: None,
             credentials: None,
             ca: None,
             monitor: None,
@@ -235,9 +261,13 @@ mod tests {
             client_id: None,
             user: None,
             password: None,
+            password_file: None,
             ca: None,
+            certificate: None,
+            key: None,
             telemetry: true,
             faults: true,
+            state: false,
             mapping: None,
         }
     }
@@ -297,6 +327,15 @@ mod tests {
             (mqtt(|config| config.client_id = Some("a b".to_owned())).map(drop), "mqtt.client_id"),
             (mqtt(|config| config.client_id = Some(String::new())).map(drop), "mqtt.client_id"),
             (mqtt(|config| config.ca = Some("ca".into())).map(drop), "mqtt.ca"),
+            (mqtt(|config| config.key = Some("k".into())).map(drop), "mqtt.certificate"),
+            (
+                mqtt(|config| {
+                    config.certificate = Some("c".into());
+                    config.key = Some("k".into());
+                })
+                .map(drop),
+                "mqtt.certificate",
+            ),
             (
                 mqtt(|config| {
                     config.telemetry = false;

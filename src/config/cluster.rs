@@ -2,8 +2,6 @@
 
 use std::net::SocketAddr;
 
-use serde::Deserialize;
-
 use super::{ConfigError, within};
 use offbd_store::{Location, MAX_PARTITIONS, NodeIdentity, Partitions};
 
@@ -11,20 +9,21 @@ use offbd_store::{Location, MAX_PARTITIONS, NodeIdentity, Partitions};
 /// large as one database supports.
 const PARTITIONS: usize = 64;
 
-/// A node of a cluster. All nodes use one PostgreSQL database.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ClusterConfig {
-    /// The name of the node, unique in the cluster: a second one does not start. A node that
-    /// restarts with the same name gets the same partitions again.
-    pub name: String,
-    /// The address to listen on for other nodes. Not encrypted: use a private network.
-    pub listen: SocketAddr,
-    /// Where other nodes reach it, `HOST:PORT`; by default the address that it listens on.
-    pub advertise: Option<String>,
-    /// Number of partitions, the same for all nodes; fixed by the first start.
-    #[serde(default = "partitions")]
-    pub partitions: usize,
+section! {
+    /// A node of a cluster. All nodes use one PostgreSQL database.
+    pub struct ClusterConfig {
+        /// Name of the node, unique in the cluster: 1 to 64 letters, digits, `-`, `_` and `.`. A
+        /// node that restarts with the same name gets the same partitions again.
+        pub name: String,
+        /// Address for the other nodes. Not encrypted: use a private network.
+        pub listen: SocketAddr,
+        /// Address at which they reach the node, `HOST:PORT`; by default `cluster.listen`.
+        /// Required if that is an unspecified address such as 0.0.0.0.
+        pub advertise: Option<String>,
+        /// Number of partitions, the same for all nodes; fixed by the first start.
+        #[serde(default = "partitions")]
+        pub partitions: usize,
+    }
 }
 
 const fn partitions() -> usize {

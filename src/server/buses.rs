@@ -100,10 +100,12 @@ mod mqtt {
             port: address.port,
             encrypted: address.encrypted,
             ca: config.ca.clone(),
+            identity: config.certificate.clone().zip(config.key.clone()),
             client_id: config.client_id(cluster),
             user: config.login()?,
             telemetry: config.telemetry,
             faults: config.faults,
+            state: config.state,
             mapping: config.mapping.as_deref().map(mapping).transpose()?.unwrap_or_default(),
         })
     }

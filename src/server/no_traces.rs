@@ -1,10 +1,10 @@
 //! Replaces `traces.rs` in builds without the feature `otel`: nothing is traced, and a
-//! configuration with an endpoint is refused ([`TracesConfig`]).
+//! configuration with an endpoint is refused.
 
 use anyhow::Result;
 use tracing_subscriber::layer::Identity;
 
-use crate::config::TracesConfig;
+use crate::config::Config;
 
 /// The sender of traces, a type without values in this build.
 pub enum Traces {}
@@ -14,7 +14,7 @@ impl Traces {
     ///
     /// # Errors
     /// Never.
-    pub fn start(_: &TracesConfig) -> Result<Option<Self>> {
+    pub fn start(_: &Config) -> Result<Option<Self>> {
         Ok(None)
     }
 

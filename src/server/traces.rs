@@ -17,7 +17,28 @@ use tracing_subscriber::Layer;
 use tracing_subscriber::filter::Targets;
 use tracing_subscriber::registry::LookupSpan;
 
-use crate::config::TracesConfig;
+use super::conventions::ConventionalExporter;
+use crate::config::{Config, TracesConfig};
+
+/// The variables that name an endpoint.
+const ENDPOINTS: [&str; 2] = ["OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT"];
+
+fn is_set(variable: &str) -> bool {
+    std::env::var_os(variable).is_some_and(|value| !value.is_empty())
+}
+
+/// What the spans are of: name and version of the service, and what the variables say.
+fn resource() -> Resource {
+    let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
+    let resource = Resource::builder().with_attribute(version);
+    let is_named = is_set("OTEL_SERVICE_NAME")
+        || std::env::var("OTEL_RESOURCE_ATTRIBUTES")
+            .is_ok_and(|text| text.contains("service.name="));
+    match is_named {
+        true => resource.build(),
+        false => resource.with_service_name("offbd").build(),
+    }
+}
 
 /// The sender of traces.
 pub struct Traces {
@@ -25,25 +46,35 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// Starts to send traces; returns `None` without an endpoint. Must be called outside
-    /// of an asynchronous runtime, because the exporter starts its own.
+    /// Starts to send traces; returns `None` without an endpoint. Where a key is not set, the
+    /// variables of OpenTelemetry apply. Must be called outside of an asynchronous runtime,
+    /// because the exporter starts its own.
     ///
     /// # Errors
     /// If the endpoint is invalid.
-    pub fn start(config: &TracesConfig) -> Result<Option<Self>> {
-        let Some(endpoint) = &config.endpoint else { return Ok(None) };
-        let endpoint = format!("{}/v1/traces", endpoint.trim_end_matches('/'));
-        let exporter = SpanExporter::builder().with_http().with_endpoint(endpoint).build();
-        let exporter = exporter.context("`traces.endpoint` is invalid")?;
-        let version = KeyValue::new("service.version", env!("CARGO_PKG_VERSION"));
-        let resource = Resource::builder().with_service_name("offbd").with_attribute(version);
-        let sampler = Sampler::ParentBased(Box::new(Sampler::TraceIdRatioBased(config.share)));
-        let provider = SdkTracerProvider::builder()
-            .with_batch_exporter(exporter)
-            .with_resource(resource.build())
-            .with_sampler(sampler)
-            .build();
-        Ok(Some(Self { provider }))
+    pub fn start(config: &Config) -> Result<Option<Self>> {
+        let TracesConfig { endpoint, share } = &config.traces;
+        if endpoint.is_none() && !ENDPOINTS.into_iter().any(is_set) {
+            return Ok(None);
+        }
+        let exporter = SpanExporter::builder().with_http();
+        let exporter = match endpoint {
+            Some(endpoint) => {
+                exporter.with_endpoint(format!("{}/v1/traces", endpoint.trim_end_matches('/')))
+            }
+            None => exporter,
+        };
+        let exporter = exporter.build().context("the endpoint of traces is invalid")?;
+        let scheme = if config.tls.is_some() { "https" } else { "http" };
+        let mut provider = SdkTracerProvider::builder()
+            .with_batch_exporter(ConventionalExporter { exporter, scheme })
+            .with_resource(resource());
+        // By default the provider follows `OTEL_TRACES_SAMPLER`.
+        if *share < 1.0 || !is_set("OTEL_TRACES_SAMPLER") {
+            let share = Box::new(Sampler::TraceIdRatioBased(*share));
+            provider = provider.with_sampler(Sampler::ParentBased(share));
+        }
+        Ok(Some(Self { provider: provider.build() }))
     }
 
     /// A layer that receives the service's own spans, independent of the log level.

@@ -179,7 +179,53 @@ async fn a_warning_says_that_the_mqtt_port_of_a_nats_server_keeps_nothing() {
 /// A broker is reached over TLS if its certificate comes from those that are named.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_broker_is_reached_over_tls() {
-    let mosquitto = Mosquitto::start_encrypted();
+    let mosquitto = Mosquitto::start_encrypted(&[]);
     let fixture = start_with(|config| config.mqtt = Some(mosquitto.encrypted_config())).await;
     connected(&fixture.client, "mqtt").await;
+}
+
+/// A broker that demands a certificate lets in only a service that has one.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broker_can_demand_a_certificate() {
+    let mosquitto = Mosquitto::start_encrypted(&["require_certificate true"]);
+    let data = tempfile::tempdir().unwrap();
+    let config = mosquitto.encrypted_config();
+    let (ca, key) = (config.ca.unwrap(), mosquitto.key());
+    let with = |more: &[(&str, &Path)]| {
+        let url = ("OFFBD_MQTT__URL", Path::new(&config.url));
+        Process::start_with(data.path(), &[&[url, ("OFFBD_MQTT__CA", &ca)], more].concat())
+    };
+    let refused = with(&[]);
+    eventually(async || {
+        refused.log().contains("the connection to the MQTT broker is lost").then_some(())
+    })
+    .await;
+    assert_eq!(count(&refused.client, "offbd_bus_connected{bus=\"mqtt\"}").await, 0.0);
+    drop(refused);
+    let named = with(&[("OFFBD_MQTT__CERTIFICATE", &ca), ("OFFBD_MQTT__KEY", &key)]);
+    connected(&named.client, "mqtt").await;
+}
+
+/// The broker says by itself that the service is gone, so that nobody believes old faults.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broker_knows_whether_the_service_is_there() {
+    let mosquitto = Mosquitto::start();
+    let data = tempfile::tempdir().unwrap();
+    let url = mosquitto.config().url;
+    let environment =
+        [("OFFBD_MQTT__URL", Path::new(&url)), ("OFFBD_MQTT__STATE", Path::new("true"))];
+    let start = || Process::start_with(data.path(), &environment);
+    let topic = "offbd/v1/=service/offbd/state";
+    let state = || mosquitto.subscribe(&["-t", topic, "-C", "1", "-W", "5"]);
+    let is = async |expected: &str| {
+        eventually(async || (state().trim() == expected).then_some(())).await;
+    };
+    let mut service = start();
+    is("online").await;
+    service.child.kill().unwrap();
+    is("offline").await;
+    let service = start();
+    is("online").await;
+    service.terminate();
+    is("offline").await;
 }

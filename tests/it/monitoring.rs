@@ -143,7 +143,7 @@ async fn metrics_count_samples_by_outcome_and_fault_transitions() {
     assert_eq!(client.n_engines().await, 1.0);
     assert_eq!(number(&after, "offbd_store_writable"), 1.0);
     #[cfg(target_os = "linux")]
-    assert!(number(&after, "offbd_process_resident_bytes") > 1e6);
+    assert!(number(&after, "process_resident_memory_bytes") > 1e6);
 }
 
 /// The dashboard of one rig asks for paths, parameters and columns that the interface has.

@@ -45,12 +45,36 @@ async fn traces_are_sent_to_the_collector() {
     process.client.asset("a").await;
     process.client.telemetry("a", Some("s"), &rig(50, usize::MAX)).await;
     let mut received = Vec::new();
-    let words =
-        ["offbd", "service.version", "request", "/api/v1/assets/a/telemetry", "judge", "commit"];
+    let words = [
+        "offbd",
+        "service.version",
+        "POST /api/v1/assets/{asset}/telemetry",
+        "http.route",
+        "http.response.status_code",
+        "/api/v1/assets/a/telemetry",
+        "judge",
+        "commit",
+    ];
     while !words.iter().all(|word| has(&received, word)) {
         let next = tokio::time::timeout(support::DEADLINE, traces.recv()).await;
         received.extend(next.expect("traces within the deadline").unwrap());
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_variables_of_opentelemetry_apply() {
+    let (address, mut traces) = collector().await;
+    let data = tempfile::tempdir().unwrap();
+    let endpoint = format!("http://{address}");
+    let settings = [
+        ("OTEL_EXPORTER_OTLP_ENDPOINT", endpoint.as_ref()),
+        ("OTEL_SERVICE_NAME", "judge-of-the-lab".as_ref()),
+        ("OTEL_TRACES_SAMPLER", "always_on".as_ref()),
+    ];
+    let process = Process::start_with(data.path(), &settings);
+    process.client.asset("a").await;
+    let received = tokio::time::timeout(support::DEADLINE, traces.recv()).await.unwrap().unwrap();
+    assert!(has(&received, "judge-of-the-lab"), "{received:?}");
 }
 
 /// The example of <https://www.w3.org/TR/trace-context/#examples-of-http-traceparent-headers>.

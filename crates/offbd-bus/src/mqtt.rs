@@ -5,22 +5,23 @@
 //! connection is made again, and the broker repeats what was not acknowledged. Each connection
 //! has a client of its own, so that no acknowledgement of one is sent on another.
 
+use std::fmt;
 use std::future::pending;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use hyper::body::Bytes;
 use rumqttc::{
-    AckMode, AsyncClient, ConnectionError, EventLoop, MqttOptions, Outgoing, Packet, Publish,
-    PublishOptions, QoS, SubscribeFilter,
+    AckMode, AsyncClient, ConnectionError, EventLoop, LastWill, MqttOptions, Outgoing, Packet,
+    Publish, PublishOptions, QoS, SubscribeFilter,
 };
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 use tokio_rustls::rustls::crypto::ring;
-use tokio_rustls::rustls::pki_types::CertificateDer;
 use tokio_rustls::rustls::pki_types::pem::PemObject;
+use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::rustls::{ClientConfig, RootCertStore};
 use tokio_util::sync::CancellationToken;
 
@@ -39,6 +40,10 @@ use offbd_wire::bus::{DeviceTopic, TopicStyle};
 use offbd_wire::mapping::Mapping;
 
 const BUS: &str = "mqtt";
+
+/// What the service says of itself, as devices do.
+const ONLINE: &str = "online";
+const OFFLINE: &str = "offline";
 
 /// Interval of MQTT's own signs of life, seconds.
 const KEEP_ALIVE_S: u16 = 20;
@@ -59,12 +64,16 @@ pub struct MqttSettings {
     /// Certificates that the broker's must come from, a PEM file; without it those of the
     /// machine.
     pub ca: Option<PathBuf>,
+    /// Certificate of the service and its private key, PEM files, for a broker that demands them.
+    pub identity: Option<(PathBuf, PathBuf)>,
     pub client_id: String,
     pub user: Option<(String, String)>,
     /// Whether batches are taken.
     pub telemetry: bool,
     /// Whether faults are published.
     pub faults: bool,
+    /// Whether the service says whether it is connected.
+    pub state: bool,
     /// Topics of devices with formats of their own.
     pub mapping: Mapping,
 }
@@ -72,8 +81,10 @@ pub struct MqttSettings {
 /// Why the settings cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum MqttError {
-    #[error("`mqtt.ca`: {path}: {reason}", path = path.display())]
-    Certificates { path: PathBuf, reason: String },
+    #[error("`mqtt.{key}`: {path}: {reason}", path = path.display())]
+    Certificates { key: &'static str, path: PathBuf, reason: String },
+    #[error("`mqtt.certificate` and `mqtt.key` cannot be used: {reason}")]
+    Identity { reason: String },
     #[error("no root certificates of the machine can be used: {reason}")]
     Roots { reason: String },
 }
@@ -126,6 +137,10 @@ fn options(settings: &MqttSettings, shortened: Shortened) -> Result<MqttOptions,
     options.set_keep_alive(KEEP_ALIVE_S);
     // The broker keeps messages of QoS 1 while the service is away.
     options.set_clean_session(false);
+    if settings.state {
+        let state = TopicStyle::Mqtt.service_state(client_id);
+        options.set_last_will(LastWill::new(state, OFFLINE, QoS::AtLeastOnce, true));
+    }
     options.set_ack_mode(AckMode::Manual);
     options.set_max_packet_size(shortened.limit(), PROTOCOL_LENGTH);
     if let Some((user, password)) = &settings.user {
@@ -142,12 +157,8 @@ fn options(settings: &MqttSettings, shortened: Shortened) -> Result<MqttOptions,
 fn tls(settings: &MqttSettings) -> Result<ClientConfig, MqttError> {
     let mut roots = RootCertStore::empty();
     if let Some(path) = &settings.ca {
-        let invalid = |reason: String| MqttError::Certificates { path: path.clone(), reason };
-        let certificates =
-            CertificateDer::pem_file_iter(path).map_err(|error| invalid(error.to_string()))?;
-        for certificate in certificates {
-            let certificate = certificate.map_err(|error| invalid(error.to_string()))?;
-            roots.add(certificate).map_err(|error| invalid(error.to_string()))?;
+        for certificate in certificates("ca", path)? {
+            roots.add(certificate).map_err(|error| unreadable("ca", path, &error))?;
         }
     } else {
         let found = rustls_native_certs::load_native_certs();
@@ -160,7 +171,28 @@ fn tls(settings: &MqttSettings) -> Result<ClientConfig, MqttError> {
     }
     let config = ClientConfig::builder_with_provider(ring::default_provider().into());
     let config = config.with_safe_default_protocol_versions().map_err(unusable)?;
-    Ok(config.with_root_certificates(roots).with_no_client_auth())
+    let config = config.with_root_certificates(roots);
+    let Some((certificate, key)) = &settings.identity else {
+        return Ok(config.with_no_client_auth());
+    };
+    let own = certificates("certificate", certificate)?;
+    let key = PrivateKeyDer::from_pem_file(key).map_err(|error| unreadable("key", key, &error))?;
+    let identity = config.with_client_auth_cert(own, key);
+    identity.map_err(|error| MqttError::Identity { reason: error.to_string() })
+}
+
+/// Reads the certificates of a PEM file, at least one.
+fn certificates(key: &'static str, path: &Path) -> Result<Vec<CertificateDer<'static>>, MqttError> {
+    let read = || CertificateDer::pem_file_iter(path)?.collect::<Result<Vec<_>, _>>();
+    let certificates = read().map_err(|error| unreadable(key, path, &error))?;
+    match certificates.is_empty() {
+        true => Err(unreadable(key, path, &"it has no certificate")),
+        false => Ok(certificates),
+    }
+}
+
+fn unreadable(key: &'static str, path: &Path, reason: &dyn fmt::Display) -> MqttError {
+    MqttError::Certificates { key, path: path.to_owned(), reason: reason.to_string() }
 }
 
 struct Broker<'a> {
@@ -179,7 +211,9 @@ impl Broker<'_> {
         while !closing.is_cancelled() {
             let client = AsyncClient::builder(options.clone()).capacity(MAX_OUTGOING);
             let (client, events) = client.build();
-            let (connection, controls) = MqttConnection::new(client);
+            let MqttSettings { state, client_id, .. } = self.settings;
+            let state = state.then(|| TopicStyle::Mqtt.service_state(client_id));
+            let (connection, controls) = MqttConnection::new(client, state);
             let (sender, receiver) = queue();
             let answering = intake.clone().run(&connection, receiver);
             let reading = self.read(&intake, &connection, events, sender, closing);
@@ -252,7 +286,8 @@ impl Broker<'_> {
         }
     }
 
-    /// Subscribes, and tells the publisher that there is a connection.
+    /// Subscribes, says that the service is there, and tells the publisher that there is a
+    /// connection.
     fn greet(&self, connection: &MqttConnection) {
         tracing::info!(host = self.settings.host, "connected to the MQTT broker");
         metrics::gauge!("offbd_bus_connected", "bus" => BUS).set(1.0);
@@ -265,6 +300,7 @@ impl Broker<'_> {
                 connection.renew.cancel();
             }
         }
+        connection.say(ONLINE);
         self.connected.send_replace(Some(connection.link.clone()));
     }
 
@@ -350,6 +386,8 @@ enum Control {
 /// One connection to a broker.
 struct MqttConnection {
     client: AsyncClient,
+    /// The topic on which the service says whether it is connected, if it does.
+    state: Option<String>,
     pubacks: Mutex<PubackQueue<Publish>>,
     link: Arc<BrokerLink>,
     /// No longer than the messages that the broker sends without waiting for acknowledgements,
@@ -360,11 +398,24 @@ struct MqttConnection {
 }
 
 impl MqttConnection {
-    fn new(client: AsyncClient) -> (Arc<Self>, mpsc::UnboundedReceiver<Control>) {
+    fn new(
+        client: AsyncClient,
+        state: Option<String>,
+    ) -> (Arc<Self>, mpsc::UnboundedReceiver<Control>) {
         let link = Arc::new(BrokerLink::new(client.clone()));
         let (controls, receiver) = mpsc::unbounded_channel();
         let (pubacks, renew) = (Mutex::default(), CancellationToken::new());
-        (Arc::new(Self { client, pubacks, link, controls, renew }), receiver)
+        (Arc::new(Self { client, state, pubacks, link, controls, renew }), receiver)
+    }
+
+    /// Says whether the service is connected. At QoS 0: an acknowledgement of QoS 1 is that of a
+    /// fault.
+    fn say(&self, state: &'static str) {
+        if let Some(topic) = &self.state {
+            let options = PublishOptions::at_most_once().retained();
+            // It fails only when the connection has ended, or much waits to be sent.
+            let _ = self.client.try_publish(topic.as_str(), state, options);
+        }
     }
 
     fn arrive(&self, publish: &Publish) -> MqttReceipt {
@@ -436,6 +487,7 @@ impl Answering for Arc<MqttConnection> {
     }
 
     async fn finish(&self) {
+        self.say(OFFLINE);
         self.end();
     }
 }

@@ -63,7 +63,7 @@ fn span(request: &Request<Body>) -> Span {
         "request", %method, path, request_id = id, asset = Empty, status = Empty
     );
     #[cfg(feature = "otel")]
-    super::trace_parent::join(&span, request.headers());
+    super::trace_parent::join(&span, request);
     span
 }
 

@@ -40,6 +40,7 @@ mod operations;
 mod page;
 mod parameters;
 mod problem;
+mod process;
 mod rates;
 mod remarks;
 mod replays;

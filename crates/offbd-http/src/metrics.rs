@@ -1,6 +1,6 @@
 //! `/metrics`: the service's metrics in the text format of Prometheus.
 //!
-//! [`METRICS`] lists all of them but `offbd_partition_epoch`. Series without labels, or with
+//! [`METRICS`] lists all of them but `offbd_partition_epoch` and those of the process. Series without labels, or with
 //! labels known in advance, are exported as 0 from the start, so that `rate()` sees the first
 //! event. No label has a value from outside the service.
 
@@ -128,8 +128,6 @@ metrics! {
     "offbd_partitions_taken_total" Counter ZERO => "Partitions that this node has taken";
     "offbd_partitions_unowned" Gauge Read(|app| Some(app.service.cluster(None).unowned as f64))
         => "Partitions without an owner, as this node last saw";
-    "offbd_process_resident_bytes" Gauge Read(|_| resident_bytes().map(|bytes| bytes as f64))
-        => "Resident memory of the process (Linux)";
     "offbd_refused_total" Counter
         At(0.0, &[("status", || vec!["401", "403", "405", "421", "429", "503"])])
         => "Requests denied by the guard, by status";
@@ -278,7 +276,7 @@ pub(super) async fn metrics(State(app): State<App>) -> impl IntoResponse {
     let handle = RECORDER.get().and_then(Option::as_ref);
     let text = handle.map(|handle| {
         handle.run_upkeep();
-        handle.render() + &epochs(&app.service.partition_epochs())
+        handle.render() + &epochs(&app.service.partition_epochs()) + &super::process::metrics()
     });
     ([(CONTENT_TYPE, "text/plain; version=0.0.4")], text.unwrap_or_default())
 }
@@ -306,12 +304,4 @@ fn sample_gauges(app: &App) {
     for (shard, waiting) in app.service.load().shards.iter().enumerate() {
         gauge!("offbd_shard_queue", "shard" => shard.to_string()).set(*waiting as f64);
     }
-}
-
-/// Returns the resident memory of the process, bytes; `None` except on Linux.
-fn resident_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
 }

@@ -94,7 +94,9 @@ pub use cluster::Route;
 pub use communication::CommunicationSettings;
 pub use edition::{Edition, EntityTag, Expected};
 pub use error::ServiceError;
-pub use limits::{Limits, OutOfRange, RETRY_AFTER_S, RequestLimits, Retention, WorkerLimits};
+pub use limits::{
+    Limits, NumberKey, OutOfRange, RETRY_AFTER_S, RequestLimits, Retention, WorkerLimits,
+};
 pub use notifications::settings::key as webhook_key;
 pub use notifications::{
     NotificationSettings, NotificationTransport, Notifier, SendOutcome, TargetPolicy,

@@ -12,17 +12,49 @@ pub struct OutOfRange {
     pub reason: String,
 }
 
+/// A key of the configuration whose value is a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NumberKey {
+    /// The key within its section.
+    pub name: &'static str,
+    /// Section and name, `limits.assets`.
+    pub path: &'static str,
+    pub value: u64,
+    pub least: u64,
+    pub most: u64,
+}
+
+impl NumberKey {
+    fn check(&self) -> Result<(), OutOfRange> {
+        let Self { path, value, least, most, .. } = *self;
+        if (least..=most).contains(&value) {
+            return Ok(());
+        }
+        let reason = format!("is {value}; it must be from {least} to {most}");
+        Err(OutOfRange { key: path, reason })
+    }
+
+    /// Checks the ranges of a section.
+    ///
+    /// # Errors
+    /// The first key whose value is out of its range.
+    pub fn check_all(keys: &[Self]) -> Result<(), OutOfRange> {
+        keys.iter().try_for_each(Self::check)
+    }
+}
+
 /// Defines a section of the configuration from a row for each key: its type, its default and
-/// its range, which may depend on the other values of the section (`$this`).
+/// its range, which may depend on the other values of the section (`$this`). The comments are
+/// the texts of the manual.
 #[macro_export]
 macro_rules! config_section {
     ($(#[$doc:meta])* $name:ident as $section:literal |$this:ident| { $(
-        $(#[$vdoc:meta])* $key:ident: $type:ty = $default:expr, $range:expr;
+        $(#[doc = $vdoc:literal])+ $key:ident: $type:ty = $default:expr, $range:expr;
     )+ }) => {
         $(#[$doc])*
-        #[derive(Clone, Debug, PartialEq, Eq, ::serde::Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Eq, ::serde::Deserialize, ::serde::Serialize)]
         #[serde(deny_unknown_fields, default)]
-        pub struct $name { $($(#[$vdoc])* pub $key: $type),+ }
+        pub struct $name { $($(#[doc = $vdoc])+ pub $key: $type),+ }
 
         impl Default for $name {
             fn default() -> Self {
@@ -31,26 +63,24 @@ macro_rules! config_section {
         }
 
         impl $name {
-            /// The keys in the configuration.
-            pub const KEYS: &'static [&'static str] =
-                &[$(concat!($section, ".", stringify!($key))),+];
+            /// The name of each key and what it sets.
+            pub const KEYS: &'static [(&'static str, &'static str)] =
+                &[$((stringify!($key), concat!($($vdoc),+))),+];
 
-            /// Checks the ranges.
-            ///
-            /// # Errors
-            /// The first key whose value is out of its range.
-            pub fn check(&self) -> Result<(), $crate::OutOfRange> {
+            /// The keys with their values and ranges.
+            #[must_use]
+            pub fn numbers(&self) -> Vec<$crate::NumberKey> {
                 let $this = self;
-                $(
-                    let (value, range) = ($this.$key, $range);
-                    if !range.contains(&value) {
-                        let (least, most) = (range.start(), range.end());
-                        let key = concat!($section, ".", stringify!($key));
-                        let reason = format!("is {value}; it must be from {least} to {most}");
-                        return Err($crate::OutOfRange { key, reason });
+                vec![$({
+                    let range: ::std::ops::RangeInclusive<$type> = $range;
+                    $crate::NumberKey {
+                        name: stringify!($key),
+                        path: concat!($section, ".", stringify!($key)),
+                        value: $this.$key as u64,
+                        least: *range.start() as u64,
+                        most: *range.end() as u64,
                     }
-                )+
-                Ok(())
+                }),+]
             }
         }
     };
@@ -59,39 +89,39 @@ macro_rules! config_section {
 config_section! {
     /// Limits of requests, memory and connections.
     RequestLimits as "limits" |limits| {
-        /// Samples in a batch; a longer batch is refused.
+        /// Samples in a batch; a longer one is answered with 413, and closes a WebSocket.
         batch_samples: usize = 10_000, 1..=1_000_000;
-        /// Bytes of a batch; a longer batch is refused.
+        /// Bytes of a batch; a longer one is answered with 413, and closes a WebSocket.
         batch_bytes: usize = 4 << 20, 1024..=1 << 30;
-        /// Bytes of an imported file; a longer file is refused.
+        /// Bytes of an imported file; a longer one is answered with 413.
         import_bytes: usize = 64 << 20, 1024..=1 << 30;
-        /// Bytes of all request bodies in memory at a time.
+        /// Bytes of all request bodies and messages in memory; then 429, and 1013 on a WebSocket.
+        /// One token, or one address of another machine, has half of it. A body in zstd counts
+        /// up to 8 MiB more while it arrives.
         bodies_bytes: usize = 256 << 20, 1024..=1 << 34;
-        /// Samples between arrival and commit; at the limit a batch is refused with
-        /// [`ServiceError::Busy`].
+        /// Samples between arrival and commit; then 429.
         in_flight_samples: usize = 500_000, limits.batch_samples..=100_000_000;
-        /// Bytes of the journal, which are also held in memory. Above this, the oldest entries
-        /// are folded into the recordings after each commit; the journal stays below twice
-        /// this.
+        /// Bytes of the journal, which are also in memory. Above this, its oldest data are folded
+        /// after each commit; a smaller journal writes more pages.
         journal_bytes: usize = 16 << 20, 1..=1 << 30;
-        /// Recorded samples from which on a session continues in another one. Chosen: at least
-        /// a day at 100 Hz. It is not a time, because a clock that is set must not divide a
-        /// session.
+        /// Samples from which on a session continues in another one, its next part. By default
+        /// at least a day at 100 Hz; not a time, because clocks are set.
         session_samples: usize = 10_000_000, 1000..=1_000_000_000;
-        /// Assets in the registry; at the limit a new asset is refused.
+        /// Assets; then 507 for a new one. Nodes of a cluster may exceed it by 64 each.
         assets: usize = 10_000, 1..=1_000_000;
-        /// Time limit to receive a request body, s; then the request is answered with 408.
+        /// Time for a request body to arrive, s; then 408. An import may take ten times as long.
         body_timeout_s: u64 = 30, 1..=3600;
-        /// Longest time for the TLS handshake, and for the head of each request to arrive, s;
-        /// then the connection is closed.
+        /// Time for the TLS handshake and for the head of a request, s; then the connection is
+        /// closed.
         header_timeout_s: u64 = 30, 1..=3600;
-        /// Longest time for which a client may stop reading, s; then the connection is closed.
+        /// Time for which a client may stop reading, s; then the connection is closed.
         write_timeout_s: u64 = 30, 1..=3600;
-        /// Connections at a time; further ones are closed at once.
+        /// Connections; further ones are closed at once.
         connections: usize = 16_384, 1..=1_000_000;
-        /// Connections of one address at a time; further ones are closed at once.
+        /// Connections of one address; further ones are closed at once.
         connections_per_address: usize = 4096, 1..=1_000_000;
-        /// Longest time for a graceful stop, s.
+        /// Time for a graceful stop, s; then the process exits with an error, and devices send
+        /// again what is not acknowledged.
         shutdown_s: u64 = 20, 1..=3600;
     }
 }
@@ -99,11 +129,10 @@ config_section! {
 config_section! {
     /// Threads and queues.
     WorkerLimits as "workers" |_this| {
-        /// Threads that run engines.
+        /// Threads that run engines; by default one for each core, and at most 16.
         shards: usize = std::thread::available_parallelism().map_or(2, usize::from).clamp(1, 16),
             1..=256;
-        /// Commands in the queue of a shard; at the limit a request is refused with
-        /// [`ServiceError::Busy`].
+        /// Commands in the queue of each of these threads; then 429.
         queue: usize = 256, 1..=100_000;
         /// Replays and calibrations that run at a time; others wait in the queue.
         jobs: usize = 1, 1..=256;

@@ -65,6 +65,13 @@ impl TopicStyle {
         self.topic(&[SERVICE_LEVEL, "faults"])
     }
 
+    /// Returns the topic on which a process of the service, which the broker knows as `client`,
+    /// says whether it is connected.
+    #[must_use]
+    pub fn service_state(self, client: &str) -> String {
+        self.topic(&[SERVICE_LEVEL, client, "state"])
+    }
+
     /// Parses a topic that a device publishes on.
     ///
     /// # Errors

@@ -1,11 +1,9 @@
-//! Compares the lists of bounds and of their keys in the operations manual with the code.
+//! Compares the list of bounds in the operations manual with the code.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::{ROOT, files};
-use offbd::config::RatesConfig;
-use offbd_service::{CommunicationSettings, RequestLimits, WorkerLimits};
 
 /// The folders whose constants are bounds of the service.
 const FOLDERS: [&str; 8] = [
@@ -18,10 +16,6 @@ const FOLDERS: [&str; 8] = [
     "crates/offbd-store/src",
     "crates/offbd-wire/src/session_file",
 ];
-
-/// The sections of the configuration whose keys are bounds.
-const SECTIONS: [&[&str]; 4] =
-    [RequestLimits::KEYS, RatesConfig::KEYS, WorkerLimits::KEYS, CommunicationSettings::KEYS];
 
 fn read(path: &str) -> String {
     std::fs::read_to_string(Path::new(ROOT).join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
@@ -77,20 +71,4 @@ fn the_manual_lists_every_bound_of_the_code_with_its_value() {
     let missing: Vec<_> = code.difference(&manual).collect();
     let wrong: Vec<_> = manual.difference(&code).collect();
     assert!(missing.is_empty() && wrong.is_empty(), "missing {missing:#?}, wrong {wrong:#?}");
-}
-
-#[test]
-fn the_manual_lists_every_bound_of_the_configuration() {
-    let config = read("src/config.rs");
-    let manual = read("docs/operations/limits.md") + &read("docs/operations/configuration.md");
-    let (_, rest) = config.split_once("pub struct RetentionConfig {").unwrap();
-    let (body, _) = rest.split_once("\n}").unwrap();
-    let fields =
-        body.lines().filter_map(|line| line.trim().strip_prefix("pub ")?.split(':').next());
-    let retention = fields.map(|field| format!("retention.{field}"));
-    let others = SECTIONS.iter().copied().flatten().map(|key| (*key).to_owned());
-    for key in others.chain(retention) {
-        let is_listed = manual.contains(&format!("`{key}`"));
-        assert!(is_listed, "{key} is neither in limits.md nor in configuration.md");
-    }
 }

@@ -9,6 +9,22 @@ fn check_prints_the_effective_configuration() {
 }
 
 #[test]
+fn check_prints_each_value_with_its_source() {
+    let cli = CliFixture::new();
+    cli.write("offbd.toml", "listen = '127.0.0.1:9'\n[limits]\nassets = 7\n");
+    let stdout = cli.ok("check --config offbd.toml --data elsewhere --print").stdout;
+    for line in ["assets = 7", "data = \"elsewhere\"", "# database ="] {
+        assert!(stdout.lines().any(|told| told.starts_with(line)), "{stdout}");
+    }
+    cli.write("again.toml", &stdout);
+    let again = cli.ok("check --config again.toml --print --format json").stdout;
+    let again: serde_json::Value = serde_json::from_str(&again).unwrap();
+    let keys = again["keys"].as_array().unwrap();
+    let data = keys.iter().find(|key| key["name"] == "data").unwrap();
+    assert_eq!((&data["value"], &data["source"]), (&"elsewhere".into(), &"again.toml".into()));
+}
+
+#[test]
 fn an_invalid_configuration_is_rejected_with_the_key() {
     let cli = CliFixture::new();
     cli.write("unknown.toml", "[limits]\nnope = 1\n");

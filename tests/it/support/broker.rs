@@ -136,6 +136,7 @@ impl Nats {
             url: format!("nats://127.0.0.1:{}", self.port),
             user: Some("offbd".to_owned()),
             password: Some(NATS_PASSWORD.to_owned()),
+            password_file: None,
             credentials: None,
             ca: None,
             monitor: Some(format!("http://127.0.0.1:{}", self.monitor_port)),
@@ -246,15 +247,18 @@ impl Mosquitto {
         })
     }
 
-    /// Starts a broker that is reached over TLS as `localhost`; its certificate is `ca`.
-    pub fn start_encrypted() -> Self {
+    /// Starts a broker that is reached over TLS as `localhost`, with further lines in its
+    /// configuration; its certificate is `ca`, which clients may use too.
+    pub fn start_encrypted(more: &[&str]) -> Self {
         let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
         Self::start_of(|directory| {
             let (certificate, key) = (directory.join("ca"), directory.join("key"));
             std::fs::write(&certificate, made.cert.pem()).unwrap();
             std::fs::write(&key, made.signing_key.serialize_pem()).unwrap();
             let (certificate, key) = (certificate.display(), key.display());
-            vec![format!("certfile {certificate}"), format!("keyfile {key}")]
+            let own = ["cafile", "certfile"].map(|name| format!("{name} {certificate}"));
+            let more = more.iter().map(|&line| line.to_owned());
+            own.into_iter().chain([format!("keyfile {key}")]).chain(more).collect()
         })
     }
 
@@ -331,6 +335,11 @@ impl Mosquitto {
         }
     }
 
+    /// The private key of a broker that is reached over TLS.
+    pub fn key(&self) -> PathBuf {
+        self.directory.path().join("key")
+    }
+
     /// Publishes each line of `input` with the program mosquitto_pub.
     pub fn publish_lines(&self, arguments: &[&str], input: &str) {
         let mut command = Command::new("mosquitto_pub");
@@ -355,9 +364,13 @@ pub fn mqtt_config(port: u16) -> offbd::config::MqttConfig {
         client_id: None,
         user: None,
         password: None,
+        password_file: None,
         ca: None,
+        certificate: None,
+        key: None,
         telemetry: true,
         faults: true,
+        state: false,
         mapping: None,
     }
 }

@@ -237,7 +237,7 @@ impl Client {
 
     /// The resident memory of the process, bytes.
     pub async fn resident_bytes(&self) -> f64 {
-        self.metric("offbd_process_resident_bytes").await
+        self.metric("process_resident_memory_bytes").await
     }
 
     /// The number of samples that the service has evaluated again to load its assets.

@@ -147,6 +147,9 @@ pub(super) fn webhook_channel() -> Channel {
 const MARKER: &str = "By which offbd finds out, after it has connected, whether the broker has lost \
     retained faults. Nobody else needs it";
 
+const STATE: &str = "Whether a process of offbd is connected: `online`; its last will is `offline`. \
+    `client` is the name by which the broker knows it. Only with `mqtt.state`";
+
 const MARK: Operation = Operation::new(Action::Send, &["faultMarker"]);
 
 /// Returns the channels of a bus.
@@ -179,6 +182,8 @@ pub(super) fn bus_channels(style: TopicStyle) -> Vec<Channel> {
         let mut marker = channel("faultMarker", style.marker(), MARKER, MARK.retained());
         marker.operations.push(Operation::new(Action::Receive, &["faultMarker", "faultQuestion"]));
         channels.push(marker);
+        let state = Operation::new(Action::Send, &["presence"]).retained();
+        channels.push(channel("serviceState", style.service_state("{client}"), STATE, state));
     }
     channels
 }
@@ -217,8 +222,11 @@ pub(super) fn query(openapi: &Value, path: &str) -> Value {
 }
 
 /// Parameters of addresses.
-pub(super) const PARAMETERS: [(&str, &str); 2] =
-    [("asset", "Name of the asset; in topics, `.` is written `=2E`"), ("code", "Fault code")];
+pub(super) const PARAMETERS: [(&str, &str); 3] = [
+    ("asset", "Name of the asset; in topics, `.` is written `=2E`"),
+    ("client", "Name by which the broker knows a process of offbd: `mqtt.client_id`"),
+    ("code", "Fault code"),
+];
 
 /// The servers, at their usual ports on this machine.
 pub(super) fn servers() -> Value {
