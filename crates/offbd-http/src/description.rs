@@ -5,10 +5,15 @@
 //! program without `View`, and `SessionPage` for a page of `Session`s, which refers to its
 //! items instead of repeating them.
 
+mod flattened;
+mod sent_headers;
+
 use axum::http::StatusCode;
-use utoipa::openapi::path::{Operation, Parameter};
+use utoipa::openapi::path::{Operation, Parameter, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Response};
+use utoipa::openapi::{
+    Components, Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Required, Response,
+};
 
 use super::routes::operations_mut;
 
@@ -46,6 +51,13 @@ const GUARDED: [SharedResponse; 2] = [
 const WITH_PARAMETERS: [SharedResponse; 1] =
     [(StatusCode::BAD_REQUEST, "InvalidParameter", "Invalid path or query parameter")];
 
+/// Responses of operations that replace or delete what has an entity tag.
+const CONDITIONAL: [SharedResponse; 1] = [(
+    StatusCode::PRECONDITION_FAILED,
+    "PreconditionFailed",
+    "Another edition than `If-Match` names; `etag` is the present one, if there is one",
+)];
+
 /// Responses of operations with a body.
 const WITH_BODY: [SharedResponse; 3] = [
     (StatusCode::BAD_REQUEST, "MalformedBody", "Malformed body; `pointer` names the element"),
@@ -57,21 +69,30 @@ const WITH_BODY: [SharedResponse; 3] = [
 /// names of the schemas.
 pub(super) fn complete(mut document: Document) -> Document {
     for operation in document.paths.paths.values_mut().flat_map(operations_mut) {
+        describe_conditions(operation);
         add_responses(operation);
-        operation.parameters.iter_mut().flatten().for_each(describe_if_match);
         for (code, response) in &mut operation.responses.responses {
             if let RefOr::T(response) = response {
                 complete_response(code, response);
             }
         }
     }
-    let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &WITH_BODY].concat();
     let components = document.components.get_or_insert_default();
-    for (_, name, description) in shared {
-        components.responses.insert(name.to_owned(), problem(description).into());
-    }
+    add_shared(components);
     use_public_names(&mut document);
+    flattened::join_closed(&mut document.components.get_or_insert_default().schemas);
     document
+}
+
+/// Adds the responses and headers to which operations refer.
+fn add_shared(components: &mut Components) {
+    sent_headers::add_to(components);
+    let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &CONDITIONAL, &WITH_BODY].concat();
+    for (status, name, description) in shared {
+        let mut response = problem(description);
+        sent_headers::describe(status.as_str(), &mut response);
+        components.responses.insert(name.to_owned(), response.into());
+    }
 }
 
 /// Gives the schemas their public names, and lets pages refer to their items.
@@ -153,8 +174,9 @@ fn rename(schema: &mut RefOr<Schema>) {
     }
 }
 
-/// The values of `If-Match`: any edition, or entity tags (RFC 9110, section 13.1.1).
-const IF_MATCH: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
+/// The values of `If-Match` and `If-None-Match`: any edition, or entity tags (RFC 9110, sections
+/// 13.1.1 and 13.1.2).
+const CONDITION: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
 
 /// How the name of a page of items begins in the program.
 const PAGE: &str = "Page_";
@@ -173,9 +195,14 @@ fn public_name(name: &str) -> String {
 fn add_responses(operation: &mut Operation) {
     let with_parameters =
         operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
-    let sets: [(bool, &[SharedResponse]); 4] = [
+    let has_condition =
+        operation.parameters.iter().flatten().any(
+            |parameter| matches!(parameter, RefOr::T(parameter) if parameter.name == "If-Match"),
+        );
+    let sets: [(bool, &[SharedResponse]); 5] = [
         (true, &ALWAYS),
         (operation.security.is_some(), &GUARDED),
+        (has_condition, &CONDITIONAL),
         (operation.request_body.is_some(), &WITH_BODY),
         (with_parameters, &WITH_PARAMETERS),
     ];
@@ -186,14 +213,37 @@ fn add_responses(operation: &mut Operation) {
     }
 }
 
-/// Describes the values of `If-Match`, without null: a header is a text or is absent.
-fn describe_if_match(parameter: &mut RefOr<Parameter>) {
-    if let RefOr::T(parameter) = parameter
-        && parameter.name == "If-Match"
-    {
-        let schema = ObjectBuilder::new().schema_type(Type::String).pattern(Some(IF_MATCH));
-        parameter.schema = Some(schema.build().into());
+/// Describes the headers by which a request depends on the edition, and lets every response with
+/// an entity tag be left out if the client has it.
+fn describe_conditions(operation: &mut Operation) {
+    for parameter in operation.parameters.iter_mut().flatten() {
+        if let RefOr::T(parameter) = parameter
+            && parameter.name == "If-Match"
+        {
+            *parameter =
+                condition("If-Match", "Entity tag of the edition to replace; any without it");
+        }
     }
+    let responses = &mut operation.responses.responses;
+    let is_tagged = responses.get("200").is_some_and(|response| match response {
+        RefOr::T(response) => response.headers.contains_key("ETag"),
+        RefOr::Ref(_) => false,
+    });
+    if is_tagged && operation.request_body.is_none() {
+        let unchanged = Response::new("The client has this edition");
+        responses.insert(StatusCode::NOT_MODIFIED.as_str().to_owned(), unchanged.into());
+        let description = "Entity tags of the editions that the client has";
+        let parameter = condition("If-None-Match", description);
+        operation.parameters.get_or_insert_default().push(parameter.into());
+    }
+}
+
+/// Describes a header of a request with entity tags, without null: it is a text or is absent.
+fn condition(name: &str, description: &str) -> Parameter {
+    let schema = ObjectBuilder::new().schema_type(Type::String).pattern(Some(CONDITION));
+    let header = ParameterBuilder::new().name(name).parameter_in(ParameterIn::Header);
+    let header = header.required(Required::False).description(Some(description));
+    header.schema(Some(schema)).build()
 }
 
 fn problem(description: &str) -> Response {
@@ -203,7 +253,7 @@ fn problem(description: &str) -> Response {
     response
 }
 
-/// Sets the description that OpenAPI requires, and the media type of problems.
+/// Sets the description that OpenAPI requires, the media type of problems, and the headers.
 fn complete_response(code: &str, response: &mut Response) {
     if response.description.is_empty() {
         let status = code.parse::<StatusCode>().ok();
@@ -221,6 +271,7 @@ fn complete_response(code: &str, response: &mut Response) {
     {
         response.content.insert(PROBLEM.to_owned(), content);
     }
+    sent_headers::describe(code, response);
 }
 
 #[cfg(test)]

@@ -22,6 +22,9 @@ use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
+    /// Address of the JSON Schema of asset files, for editors; otherwise ignored.
+    #[serde(rename = "$schema", default, skip_serializing)]
+    pub schema: Option<String>,
     /// Name of the asset: 1 to 128 letters, digits, `-`, `_` or `.`.
     #[schema(pattern = "^[A-Za-z0-9._-]{1,128}$")]
     pub name: String,
@@ -716,6 +719,7 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
 #[must_use]
 pub fn view(rig: &Rig) -> AssetView {
     AssetView {
+        schema: None,
         name: rig.name.clone(),
         sample_rate_hz: rig.sample_rate_hz,
         ball: BallView {
