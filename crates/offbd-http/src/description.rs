@@ -5,6 +5,7 @@
 //! program without `View`, and `SessionPage` for a page of `Session`s, which refers to its
 //! items instead of repeating them.
 
+mod examples;
 mod flattened;
 mod sent_headers;
 
@@ -15,33 +16,32 @@ use utoipa::openapi::{
     Components, Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Required, Response,
 };
 
+use serde_json::json;
+
+use self::examples::Examples;
 use super::routes::operations_mut;
+use offbd_wire::problem::{
+    BUSY, CHANGED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MISDIRECTED, ProblemType, SLOW_BODY,
+    TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
+};
 
 const PROBLEM: &str = "application/problem+json";
 
-/// A response that operations share: its status, its component name, its description.
-type SharedResponse = (StatusCode, &'static str, &'static str);
+/// A response that operations share: a problem, its component name, its description.
+type SharedResponse = (&'static ProblemType, &'static str, &'static str);
 
 /// Responses of every operation.
 const ALWAYS: [SharedResponse; 3] = [
-    (
-        StatusCode::MISDIRECTED_REQUEST,
-        "MisdirectedRequest",
-        "Unknown host name in `Host`, while authentication is off",
-    ),
-    (StatusCode::TOO_MANY_REQUESTS, "TooManyRequests", "Too many requests; see `Retry-After`"),
-    (
-        StatusCode::SERVICE_UNAVAILABLE,
-        "ServiceUnavailable",
-        "Temporarily unavailable; see `Retry-After`",
-    ),
+    (MISDIRECTED, "MisdirectedRequest", "Unknown host name in `Host`, while authentication is off"),
+    (BUSY, "TooManyRequests", "Too many requests; see `Retry-After`"),
+    (UNAVAILABLE, "ServiceUnavailable", "Temporarily unavailable; see `Retry-After`"),
 ];
 
 /// Responses of operations that require a token.
 const GUARDED: [SharedResponse; 2] = [
-    (StatusCode::UNAUTHORIZED, "Unauthorized", "No token, or an invalid one"),
+    (UNAUTHENTICATED, "Unauthorized", "No token, or an invalid one"),
     (
-        StatusCode::FORBIDDEN,
+        FORBIDDEN,
         "Forbidden",
         "The token has no such right, or the request comes from a page of another site",
     ),
@@ -49,26 +49,27 @@ const GUARDED: [SharedResponse; 2] = [
 
 /// Responses of operations with parameters in path or query.
 const WITH_PARAMETERS: [SharedResponse; 1] =
-    [(StatusCode::BAD_REQUEST, "InvalidParameter", "Invalid path or query parameter")];
+    [(MALFORMED_QUERY, "InvalidParameter", "Invalid path or query parameter")];
 
 /// Responses of operations that replace or delete what has an entity tag.
 const CONDITIONAL: [SharedResponse; 1] = [(
-    StatusCode::PRECONDITION_FAILED,
+    CHANGED,
     "PreconditionFailed",
     "Another edition than `If-Match` names; `etag` is the present one, if there is one",
 )];
 
 /// Responses of operations with a body.
 const WITH_BODY: [SharedResponse; 3] = [
-    (StatusCode::BAD_REQUEST, "MalformedBody", "Malformed body; `pointer` names the element"),
-    (StatusCode::REQUEST_TIMEOUT, "RequestTimeout", "The body was not received in time"),
-    (StatusCode::PAYLOAD_TOO_LARGE, "ContentTooLarge", "The body is too long"),
+    (MALFORMED, "MalformedBody", "Malformed body; `pointer` names the element"),
+    (SLOW_BODY, "RequestTimeout", "The body was not received in time"),
+    (TOO_LARGE, "ContentTooLarge", "The body is too long"),
 ];
 
 /// Returns `document` with the shared responses added to every operation, and with the public
 /// names of the schemas.
 pub(super) fn complete(mut document: Document) -> Document {
     for operation in document.paths.paths.values_mut().flat_map(operations_mut) {
+        shorten_summary(operation);
         describe_conditions(operation);
         add_responses(operation);
         for (code, response) in &mut operation.responses.responses {
@@ -81,16 +82,38 @@ pub(super) fn complete(mut document: Document) -> Document {
     add_shared(components);
     use_public_names(&mut document);
     flattened::join_closed(&mut document.components.get_or_insert_default().schemas);
+    add_examples(&mut document);
     document
+}
+
+fn add_examples(document: &mut Document) {
+    let components = document.components.get_or_insert_default();
+    let examples = Examples::new(&components.schemas);
+    document.paths.paths.values_mut().flat_map(operations_mut).for_each(|o| examples.attach(o));
+    examples.add_to(components);
+}
+
+/// Leaves the first sentence in the summary of an operation, and moves the others to its
+/// description.
+fn shorten_summary(operation: &mut Operation) {
+    let Some(summary) = operation.summary.take() else { return };
+    let summary = summary.replace('\n', " ");
+    let Some((first, rest)) = summary.split_once(". ") else {
+        operation.summary = Some(summary);
+        return;
+    };
+    operation.summary = Some(format!("{first}."));
+    let further = operation.description.take().map(|text| format!("\n\n{text}"));
+    operation.description = Some(format!("{rest}{}", further.unwrap_or_default()));
 }
 
 /// Adds the responses and headers to which operations refer.
 fn add_shared(components: &mut Components) {
     sent_headers::add_to(components);
     let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &CONDITIONAL, &WITH_BODY].concat();
-    for (status, name, description) in shared {
-        let mut response = problem(description);
-        sent_headers::describe(status.as_str(), &mut response);
+    for (kind, name, description) in shared {
+        let mut response = problem(kind, description);
+        sent_headers::describe(&kind.status.to_string(), &mut response);
         components.responses.insert(name.to_owned(), response.into());
     }
 }
@@ -181,13 +204,16 @@ const CONDITION: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
 /// How the name of a page of items begins in the program.
 const PAGE: &str = "Page_";
 
+/// What the public name of a page of items ends with.
+const PAGE_SUFFIX: &str = "Page";
+
 /// How a reference to a schema begins.
 const SCHEMAS: &str = "#/components/schemas/";
 
 fn public_name(name: &str) -> String {
     let without_view = |name: &str| name.strip_suffix("View").unwrap_or(name).to_owned();
     match name.strip_prefix(PAGE) {
-        Some(item) => format!("{}Page", without_view(item)),
+        Some(item) => format!("{}{PAGE_SUFFIX}", without_view(item)),
         None => without_view(name),
     }
 }
@@ -207,9 +233,9 @@ fn add_responses(operation: &mut Operation) {
         (with_parameters, &WITH_PARAMETERS),
     ];
     let sets = sets.into_iter().filter_map(|(applies, set)| applies.then_some(set));
-    for (status, name, _) in sets.flatten() {
+    for (kind, name, _) in sets.flatten() {
         let shared = || Ref::from_response_name(*name).into();
-        operation.responses.responses.entry(status.as_str().to_owned()).or_insert_with(shared);
+        operation.responses.responses.entry(kind.status.to_string()).or_insert_with(shared);
     }
 }
 
@@ -246,10 +272,15 @@ fn condition(name: &str, description: &str) -> Parameter {
     header.schema(Some(schema)).build()
 }
 
-fn problem(description: &str) -> Response {
-    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+/// Returns the description of a response with a problem, of which `kind` is an example.
+fn problem(kind: &ProblemType, description: &str) -> Response {
+    let example = json!({
+        "type": kind.uri(), "title": kind.title, "status": kind.status, "detail": description,
+        "instance": "urn:uuid:01a22327-7024-709a-a9fb-8a9966023fc9",
+    });
+    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem")));
     let mut response = Response::new(description);
-    response.content.insert(PROBLEM.to_owned(), content.into());
+    response.content.insert(PROBLEM.to_owned(), content.example(Some(example)).build().into());
     response
 }
 
@@ -276,7 +307,7 @@ fn complete_response(code: &str, response: &mut Response) {
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
+    use serde_json::Value;
 
     use super::*;
 

@@ -120,6 +120,8 @@ impl FromRef<App> for Service {
             Lengths are in metres, angles in radians, sample times in seconds on the device's \
             clock. Timestamps of the service are RFC 3339.",
     ),
+    // The service that the description comes from.
+    servers((url = "/")),
     components(schemas(
         offbd_wire::service::EventView,
         offbd_wire::words::SessionSort,
