@@ -1,11 +1,12 @@
 //! The examples in `openapi.yaml`: every body that a person writes has one, and each is as its
 //! schema says.
 
-use boon::Schemas;
-use serde_json::Value;
+use boon::{Compiler, Schemas};
+use serde_json::{Value, json};
 
 use crate::support::described::resolved;
 use crate::support::described_answers::{SchemaTable, openapi, operations};
+use crate::support::registration;
 
 /// A body in the description: where it is, its media type, its schema and its examples.
 struct ExampleBody {
@@ -76,5 +77,23 @@ fn every_example_is_as_its_schema_says() {
             let valid = schemas.validate(example, schema);
             assert!(valid.is_ok(), "{}: {example}\n{:#}", body.place, valid.unwrap_err());
         }
+    }
+}
+
+/// As an editor checks an asset file.
+#[test]
+fn asset_files_are_as_their_schema_says() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/asset.schema.json");
+    let schema = std::fs::read_to_string(path).unwrap();
+    let (mut compiler, mut schemas) = (Compiler::new(), Schemas::new());
+    let place = "https://offbd.example/asset.schema.json";
+    compiler.add_resource(place, serde_json::from_str(&schema).unwrap()).unwrap();
+    let schema = compiler.compile(place, &mut schemas).unwrap();
+    let mut learnt = registration("a");
+    learnt["$schema"] = "asset.schema.json".into();
+    schemas.validate(&learnt, schema).unwrap();
+    for wrong in [json!({}), json!({ "name": "a", "colour": 1 }), json!({ "name": "a", "ball": 1 })]
+    {
+        assert!(schemas.validate(&wrong, schema).is_err(), "{wrong}");
     }
 }

@@ -21,8 +21,8 @@ use serde_json::json;
 use self::examples::Examples;
 use super::routes::operations_mut;
 use offbd_wire::problem::{
-    BUSY, CHANGED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MISDIRECTED, ProblemType, SLOW_BODY,
-    TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
+    BUSY, CHANGED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MEDIA_TYPE, MISDIRECTED, ProblemType,
+    SLOW_BODY, TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
 };
 
 const PROBLEM: &str = "application/problem+json";
@@ -30,8 +30,9 @@ const PROBLEM: &str = "application/problem+json";
 /// A response that operations share: a problem, its component name, its description.
 type SharedResponse = (&'static ProblemType, &'static str, &'static str);
 
-/// Responses of every operation.
-const ALWAYS: [SharedResponse; 3] = [
+/// Responses of every operation; the query is checked also where it has no parameters.
+const ALWAYS: [SharedResponse; 4] = [
+    (MALFORMED_QUERY, "InvalidParameter", "Invalid path or query parameter"),
     (MISDIRECTED, "MisdirectedRequest", "Unknown host name in `Host`, while authentication is off"),
     (BUSY, "TooManyRequests", "Too many requests; see `Retry-After`"),
     (UNAVAILABLE, "ServiceUnavailable", "Temporarily unavailable; see `Retry-After`"),
@@ -47,10 +48,6 @@ const GUARDED: [SharedResponse; 2] = [
     ),
 ];
 
-/// Responses of operations with parameters in path or query.
-const WITH_PARAMETERS: [SharedResponse; 1] =
-    [(MALFORMED_QUERY, "InvalidParameter", "Invalid path or query parameter")];
-
 /// Responses of operations that replace or delete what has an entity tag.
 const CONDITIONAL: [SharedResponse; 1] = [(
     CHANGED,
@@ -59,10 +56,15 @@ const CONDITIONAL: [SharedResponse; 1] = [(
 )];
 
 /// Responses of operations with a body.
-const WITH_BODY: [SharedResponse; 3] = [
+const WITH_BODY: [SharedResponse; 4] = [
     (MALFORMED, "MalformedBody", "Malformed body; `pointer` names the element"),
     (SLOW_BODY, "RequestTimeout", "The body was not received in time"),
     (TOO_LARGE, "ContentTooLarge", "The body is too long"),
+    (
+        MEDIA_TYPE,
+        "UnsupportedMediaType",
+        "Unsupported `Content-Type` or, with `Accept-Encoding`, `Content-Encoding`",
+    ),
 ];
 
 /// Returns `document` with the shared responses added to every operation, and with the public
@@ -110,7 +112,7 @@ fn shorten_summary(operation: &mut Operation) {
 /// Adds the responses and headers to which operations refer.
 fn add_shared(components: &mut Components) {
     sent_headers::add_to(components);
-    let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &CONDITIONAL, &WITH_BODY].concat();
+    let shared = [&ALWAYS[..], &GUARDED, &CONDITIONAL, &WITH_BODY].concat();
     for (kind, name, description) in shared {
         let mut response = problem(kind, description);
         sent_headers::describe(&kind.status.to_string(), &mut response);
@@ -219,18 +221,12 @@ fn public_name(name: &str) -> String {
 }
 
 fn add_responses(operation: &mut Operation) {
-    let with_parameters =
-        operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
-    let has_condition =
-        operation.parameters.iter().flatten().any(
-            |parameter| matches!(parameter, RefOr::T(parameter) if parameter.name == "If-Match"),
-        );
-    let sets: [(bool, &[SharedResponse]); 5] = [
-        (true, &ALWAYS),
-        (operation.security.is_some(), &GUARDED),
-        (has_condition, &CONDITIONAL),
+    // Of two responses with the same status the first one is described.
+    let sets: [(bool, &[SharedResponse]); 4] = [
         (operation.request_body.is_some(), &WITH_BODY),
-        (with_parameters, &WITH_PARAMETERS),
+        (operation.security.is_some(), &GUARDED),
+        (header(operation, "If-Match").is_some(), &CONDITIONAL),
+        (true, &ALWAYS),
     ];
     let sets = sets.into_iter().filter_map(|(applies, set)| applies.then_some(set));
     for (kind, name, _) in sets.flatten() {
@@ -242,13 +238,8 @@ fn add_responses(operation: &mut Operation) {
 /// Describes the headers by which a request depends on the edition, and lets every response with
 /// an entity tag be left out if the client has it.
 fn describe_conditions(operation: &mut Operation) {
-    for parameter in operation.parameters.iter_mut().flatten() {
-        if let RefOr::T(parameter) = parameter
-            && parameter.name == "If-Match"
-        {
-            *parameter =
-                condition("If-Match", "Entity tag of the edition to replace; any without it");
-        }
+    if let Some(parameter) = header(operation, "If-Match") {
+        *parameter = condition("If-Match", "Entity tag of the edition to replace; any without it");
     }
     let responses = &mut operation.responses.responses;
     let is_tagged = responses.get("200").is_some_and(|response| match response {
@@ -262,6 +253,14 @@ fn describe_conditions(operation: &mut Operation) {
         let parameter = condition("If-None-Match", description);
         operation.parameters.get_or_insert_default().push(parameter.into());
     }
+}
+
+/// Returns the description of a header that an operation has.
+fn header<'a>(operation: &'a mut Operation, name: &str) -> Option<&'a mut Parameter> {
+    operation.parameters.iter_mut().flatten().find_map(|parameter| match parameter {
+        RefOr::T(parameter) if parameter.name == name => Some(parameter),
+        _ => None,
+    })
 }
 
 /// Describes a header of a request with entity tags, without null: it is a text or is absent.

@@ -48,6 +48,7 @@ fn view(caller: &Caller) -> CallerView {
     request_body = NewLogin,
     responses((status = 200, body = CallerView, headers(("Set-Cookie"))), (status = 400, body = Problem),
         (status = 401, body = Problem, description = "Invalid, expired or revoked token"),
+        (status = 403, body = Problem, description = "The request comes from a page of another site"),
         (status = 422, body = Problem)))]
 pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<Response, Problem> {
     let address = client_address(request.extensions()).map(|address| address.to_string());

@@ -860,6 +860,14 @@ mod tests {
     }
 
     #[test]
+    fn the_address_of_the_schema_is_accepted_and_not_kept() {
+        let rig = parse(br#"{"$schema":"asset.schema.json","name":"a"}"#).unwrap();
+        assert_eq!(rig, Rig::chapter("a"));
+        let error = parse(br#"{"$schema":5,"name":"a"}"#).unwrap_err();
+        assert_eq!(error.element, "/$schema");
+    }
+
+    #[test]
     fn a_ball_that_does_not_fit_on_its_plate_is_refused() {
         let refused = |text: &str| parse_new(text.as_bytes()).unwrap_err().to_string();
         let wide = r#"{"name":"a","ball":{"radius_m":0.712,"mass_kg":0.05,"inertia_factor":0.4}}"#;

@@ -15,7 +15,8 @@ use super::{Answer, described};
 const PLACE: &str = "https://offbd.example/answers.json";
 
 /// Headers that are described wherever they are sent.
-const DESCRIBED_HEADERS: [&str; 7] = [
+const DESCRIBED_HEADERS: [&str; 8] = [
+    "accept-encoding",
     "x-request-id",
     "retry-after",
     "www-authenticate",

@@ -19,7 +19,7 @@ struct SentHeader {
 /// The header of every response.
 const REQUEST_ID: &str = "x-request-id";
 
-const HEADERS: [SentHeader; 7] = [
+const HEADERS: [SentHeader; 8] = [
     SentHeader {
         name: REQUEST_ID,
         always_with: &[],
@@ -34,9 +34,15 @@ const HEADERS: [SentHeader; 7] = [
     },
     SentHeader {
         name: "WWW-Authenticate",
-        always_with: &[StatusCode::UNAUTHORIZED],
+        always_with: &[StatusCode::UNAUTHORIZED, StatusCode::FORBIDDEN],
         kind: Type::String,
-        description: "The scheme of authentication, and whether the token is invalid",
+        description: "The scheme of authentication, and what the token lacks",
+    },
+    SentHeader {
+        name: "Accept-Encoding",
+        always_with: &[StatusCode::UNSUPPORTED_MEDIA_TYPE],
+        kind: Type::String,
+        description: "The codings that a body may have, if it has another one",
     },
     SentHeader {
         name: "ETag",
