@@ -23,7 +23,7 @@ use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
     /// Address of the JSON Schema of asset files, for editors; otherwise ignored.
-    #[serde(rename = "$schema", default, skip_serializing)]
+    #[serde(rename = "$schema", default, skip_serializing_if = "Option::is_none")]
     pub schema: Option<String>,
     /// Name of the asset: 1 to 128 letters, digits, `-`, `_` or `.`.
     #[schema(pattern = "^[A-Za-z0-9._-]{1,128}$")]

@@ -1,6 +1,6 @@
 //! Examples of bodies.
 //!
-//! An example is for every body with its schema. A page without an example of its own has one
+//! An example is for every JSON body with its schema. A page without an example of its own has one
 //! item.
 
 use std::collections::BTreeMap;
@@ -46,22 +46,27 @@ impl Examples {
 
     /// Refers to the examples of the bodies of an operation.
     pub(super) fn attach(&self, operation: &mut Operation) {
-        if let Some(RefOr::T(body)) = &mut operation.request_body {
-            for (media_type, content) in &mut body.content {
-                let text = TEXTS.iter().find(|(of, _)| of == media_type);
-                self.attach_to(content, text.map(|(_, name)| *name));
-            }
+        let body = operation.request_body.iter_mut().filter_map(|body| match body {
+            RefOr::T(body) => Some(&mut body.content),
+            RefOr::Ref(_) => None,
+        });
+        for (media_type, content) in body.flatten() {
+            let text = TEXTS.iter().find(|(of, _)| of == media_type);
+            self.attach_to(media_type, content, text.map(|(_, name)| *name));
         }
         for response in operation.responses.responses.values_mut() {
-            if let RefOr::T(response) = response {
-                response.content.values_mut().for_each(|content| self.attach_to(content, None));
+            let RefOr::T(response) = response else { continue };
+            for (media_type, content) in &mut response.content {
+                self.attach_to(media_type, content, None);
             }
         }
     }
 
-    fn attach_to(&self, content: &mut RefOr<Content>, name: Option<&str>) {
+    /// Refers to the example `name`, or to that of the schema of a JSON body.
+    fn attach_to(&self, media_type: &str, content: &mut RefOr<Content>, name: Option<&str>) {
         let RefOr::T(content) = content else { return };
-        let name = name.or_else(|| schema_name(content.schema.as_ref()?));
+        let of_schema = content.schema.as_ref().and_then(schema_name);
+        let name = name.or_else(|| of_schema.filter(|_| media_type == "application/json"));
         if let Some((name, _)) = name.and_then(|name| self.0.get_key_value(name)) {
             let reference = Ref::new(format!("#/components/examples/{name}"));
             content.examples.insert("example".to_owned(), RefOr::Ref(reference));
