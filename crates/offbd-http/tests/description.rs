@@ -1,6 +1,8 @@
 //! The committed descriptions of the interface equal those generated from the code, and do not
 //! contradict themselves.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
