@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 
-READ = "import json, sys; from ruamel.yaml import YAML; print(json.dumps(YAML(typ='safe').load(open(sys.argv[1]))))"
+READ = "import json, sys; from ruamel.yaml import YAML; print(json.dumps(YAML(typ='safe').load(open(sys.argv[1])), default=str))"
 
 # Bodies that the generator does not support. The operations have another body, so that they
 # are in the client nevertheless.

@@ -174,9 +174,9 @@ async fn validate_every_operation_against_every_kind_of_caller() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_pages_and_the_openapi_description_need_no_token() {
     let service = SecuredService::new().await;
-    for path in
-        ["/", "/docs/", "/docs/swagger-ui.css", "/openapi.yaml", "/openapi.json", "/asyncapi.yaml"]
-    {
+    let docs = ["/", "/docs/", "/docs/swagger-ui.css"];
+    let files = ["/openapi.yaml", "/openapi.json", "/asyncapi.yaml", "/asset.schema.json"];
+    for path in docs.into_iter().chain(files) {
         let answer = service.fixture.client.get(path).await;
         assert_eq!(answer.status, 200, "{path}");
         assert_eq!(answer.headers["x-content-type-options"], "nosniff", "{path}");

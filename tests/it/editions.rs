@@ -1,4 +1,4 @@
-//! `ETag` and `If-Match`: of two people who edit the same thing, the second does not overwrite the
+//! `ETag`, `If-Match` and `If-None-Match`: of two people who edit the same thing, the second does not overwrite the
 //! change of the first unseen.
 
 use std::collections::BTreeMap;
@@ -73,6 +73,11 @@ async fn send(client: &Client, method: Method, path: &str, body: &Value, tag: &s
     client.send(client.request(method, path).json(body).header("if-match", tag)).await
 }
 
+/// Asks for what the client may have already.
+async fn ask(client: &Client, path: &str, known: &str) -> Answer {
+    client.send(client.request(Method::GET, path).header("if-none-match", known)).await
+}
+
 #[tokio::test]
 async fn the_second_of_two_editors_gets_412_with_the_present_tag() {
     let fixture = ServiceFixture::start().await;
@@ -83,6 +88,14 @@ async fn the_second_of_two_editors_gets_412_with_the_present_tag() {
         let first = send(client, Method::PUT, path, &each.content(1), &read).await;
         first.expect(200);
         assert_ne!(tag(&first), read, "{path}");
+        // Who has the first edition gets the second, and who has that gets its tag alone.
+        ask(client, path, &read).await.expect(200);
+        for known in [tag(&first), format!("\"x\", W/{}", tag(&first)), "*".to_owned()] {
+            let unchanged = ask(client, path, &known).await;
+            assert_eq!(unchanged.expect(304), Value::Null, "{path}: {known}");
+            assert_eq!(tag(&unchanged), tag(&first), "{path}");
+        }
+        ask(client, path, "x").await.problem(400);
         let second = send(client, Method::PUT, path, &each.content(2), &read).await;
         let problem = second.problem(412);
         assert_eq!(problem["type"], "urn:offbd:problem:changed", "{path}");

@@ -20,6 +20,7 @@ mod crash;
 mod damage;
 mod editions;
 mod engine_snapshot;
+mod examples;
 mod fault_memory;
 mod formats;
 mod forward;

@@ -645,6 +645,9 @@ async fn health_metrics_description_and_pages_are_served() {
     assert!(metrics.contains("path=\"/api/v1/assets/{asset}/telemetry\""), "{metrics}");
     let yaml = client.get("/openapi.yaml").await;
     assert_eq!(yaml.text, offbd::http::openapi_yaml());
+    let schema = client.get("/asset.schema.json").await;
+    assert_eq!(schema.headers["content-type"], "application/schema+json");
+    assert_eq!(schema.text, offbd::http::asset_schema());
     let docs = client.get("/docs/").await;
     assert!(docs.status == 200 && docs.text.contains("swagger"), "{docs:?}");
     let page = client.get("/").await;

@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use super::parsed;
 use super::spool::NewBatch;
-use offbd_wire::PROBLEM_TYPE;
+use offbd_wire::problem::PROBLEM_TYPE;
 use offbd_wire::telemetry::{AckView, RowsView, sample_view};
 
 /// Longest reason that is kept or logged, bytes. Chosen: all reasons for which the service rejects

@@ -8,7 +8,7 @@ use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, HeaderValue, RETRY_AFTER}
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use offbd_core::vocabulary::Invalid;
-use offbd_wire::PROBLEM_TYPE;
+use offbd_wire::problem::{self, ProblemType};
 use offbd_wire::telemetry::{BatchError, UnsupportedMediaType};
 use serde_json::{Value, json};
 use tower_http::request_id::RequestId;
@@ -41,30 +41,21 @@ pub(super) enum Refusal {
 }
 
 impl Refusal {
-    /// The status, the name of the problem's type, and its title.
-    fn kind(&self) -> (StatusCode, &'static str, &'static str) {
+    fn kind(&self) -> &'static ProblemType {
         match self {
-            Self::MediaType(_) => {
-                (StatusCode::UNSUPPORTED_MEDIA_TYPE, "media-type", "Unsupported media type")
-            }
-            Self::Batch(BatchError::Malformed { .. }) => {
-                (StatusCode::BAD_REQUEST, "malformed", "Malformed body")
-            }
-            Self::Batch(BatchError::TooMany { .. }) => {
-                (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
-            }
+            Self::MediaType(_) => problem::MEDIA_TYPE,
+            Self::Batch(BatchError::Malformed { .. }) => problem::MALFORMED,
+            Self::Batch(BatchError::TooMany { .. }) => problem::TOO_LARGE,
             Self::Body(rejection) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
-                (StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
+                problem::TOO_LARGE
             }
-            Self::Body(_) => (StatusCode::BAD_REQUEST, "malformed", "Malformed body"),
-            Self::SlowBody => (StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout"),
-            Self::Host => (StatusCode::MISDIRECTED_REQUEST, "misdirected", "Misdirected request"),
-            Self::Origin => (StatusCode::FORBIDDEN, "forbidden", "Forbidden"),
-            Self::Asset(_) => (StatusCode::UNPROCESSABLE_ENTITY, "invalid", "Invalid value"),
-            Self::Spool(SpoolError::Full { .. }) => {
-                (StatusCode::TOO_MANY_REQUESTS, "spool-full", "Spool full")
-            }
-            Self::Spool(_) => (StatusCode::SERVICE_UNAVAILABLE, "spool", "Not stored"),
+            Self::Body(_) => problem::MALFORMED,
+            Self::SlowBody => problem::SLOW_BODY,
+            Self::Host => problem::MISDIRECTED,
+            Self::Origin => problem::FORBIDDEN,
+            Self::Asset(_) => problem::INVALID,
+            Self::Spool(SpoolError::Full { .. }) => problem::SPOOL_FULL,
+            Self::Spool(_) => problem::SPOOL,
         }
     }
 
@@ -81,15 +72,16 @@ impl Refusal {
 impl IntoResponse for Refusal {
     /// The body is written by [`name_request`], which knows the id of the request.
     fn into_response(self) -> Response {
-        let (status, slug, title) = self.kind();
+        let kind = self.kind();
         let mut problem = json!({
-            "type": format!("{PROBLEM_TYPE}{slug}"), "title": title, "status": status.as_u16(),
+            "type": kind.uri(), "title": kind.title, "status": kind.status,
             "detail": self.to_string(),
         });
         if let Some(pointer) = self.pointer() {
             problem["pointer"] = pointer.into();
         }
-        let mut response = status.into_response();
+        let status = StatusCode::from_u16(kind.status);
+        let mut response = status.unwrap_or(StatusCode::INTERNAL_SERVER_ERROR).into_response();
         let headers = response.headers_mut();
         headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
         if let Self::Spool(_) = self {

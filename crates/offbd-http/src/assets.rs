@@ -5,10 +5,10 @@ use axum::body::Body;
 use axum::extract::State;
 use axum::http::header::LOCATION;
 use axum::http::{HeaderMap, StatusCode};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use super::edition::{IfMatch, Tagged, tagged};
+use super::edition::{IfMatch, IfNoneMatch, tagged};
 use super::layers::record_asset;
 use super::{App, AssetPath, Problem, Query, json_body, page_limit};
 use offbd_service::Service;
@@ -46,8 +46,7 @@ pub(super) async fn list(
 /// Registers an asset; the body is its asset file.
 #[utoipa::path(post, path = "/assets", tag = "assets", operation_id = "create_asset",
     request_body = AssetView, responses(
-        (status = 201, body = AssetView, description = "Created; `Location` has its URL",
-            headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+        (status = 201, body = AssetView, headers(("ETag"), ("Location"))),
         (status = 400, body = Problem,
             description = "Malformed asset file; `pointer` names the element"),
         (status = 409, body = Problem, description = "An asset of this name exists"),
@@ -68,25 +67,25 @@ pub(super) async fn create(
 /// Returns the asset file with all defaults filled in.
 #[utoipa::path(get, path = "/assets/{asset}", tag = "assets", operation_id = "get_asset",
     params(("asset" = String, description = "Name of the asset")),
-    responses((status = 200, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = AssetView, headers(("ETag"))),
         (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,
-) -> Result<Tagged<AssetView>, Problem> {
-    Ok(tagged(service.asset_edition(&asset).await?))
+    known: IfNoneMatch,
+) -> Result<Response, Problem> {
+    Ok(known.answer(tagged(service.asset_edition(&asset).await?)))
 }
 
 /// Replaces the asset file, or registers the asset. An open session keeps the asset file
 /// that it started with; the next session uses the new one.
 #[utoipa::path(put, path = "/assets/{asset}", tag = "assets", operation_id = "put_asset",
     params(("asset" = String, description = "Name of the asset"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+        ("If-Match" = Option<String>, Header)),
     request_body = AssetView,
-    responses((status = 200, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
-        (status = 201, body = AssetView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = AssetView, headers(("ETag"))),
+        (status = 201, body = AssetView, headers(("ETag"))),
         (status = 400, body = Problem),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
         (status = 422, body = Problem)))]
 pub(super) async fn put(
     State(app): State<App>,
@@ -106,9 +105,8 @@ pub(super) async fn put(
 /// before it has finished gets 429.
 #[utoipa::path(delete, path = "/assets/{asset}", tag = "assets", operation_id = "delete_asset",
     params(("asset" = String, description = "Name of the asset"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
-    responses((status = 204), (status = 404, body = Problem),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
+        ("If-Match" = Option<String>, Header)),
+    responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn delete(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,

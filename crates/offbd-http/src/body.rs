@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::HeaderMap;
 use futures_util::StreamExt;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
@@ -14,6 +14,7 @@ use tokio::time::timeout;
 use super::Problem;
 use super::coding::Coding;
 use offbd_service::ServiceError;
+use offbd_wire::problem::{MALFORMED, SLOW_BODY, TOO_LARGE};
 
 /// The limit of request body bytes in memory at a time, over all requests. A request
 /// that would exceed it is answered with 429.
@@ -98,7 +99,7 @@ pub(super) async fn read(
     let coding = Coding::of(headers)?;
     timeout(time, collect(coding, body, limit, share)).await.unwrap_or_else(|_| {
         let detail = format!("the body was not complete within {} s", time.as_secs());
-        Err(Problem::new(StatusCode::REQUEST_TIMEOUT, "slow-body", "Request timeout", detail))
+        Err(Problem::new(SLOW_BODY, detail))
     })
 }
 
@@ -135,13 +136,13 @@ fn incomplete(error: &io::Error, coding: Coding, limit: usize) -> Problem {
             format!("the body was not received completely, or cannot be decompressed: {error}")
         }
     };
-    Problem::new(StatusCode::BAD_REQUEST, "malformed", "Malformed body", detail)
+    Problem::new(MALFORMED, detail)
 }
 
 fn too_large(coding: Coding, limit: usize) -> Problem {
     let decoded = if coding == Coding::Identity { "" } else { ", decompressed" };
     let detail = format!("the body is longer than {limit} bytes{decoded}");
-    Problem::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
+    Problem::new(TOO_LARGE, detail)
 }
 
 impl AsRef<[u8]> for BudgetedBody {

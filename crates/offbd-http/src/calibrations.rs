@@ -29,7 +29,7 @@ pub(super) struct NewCalibration {
     params(("asset" = String, description = "Name of the asset"), ActorQuery),
     request_body = NewCalibration,
     responses(
-        (status = 202, body = CalibrationJobView, description = "`Location` has the job's URL"),
+        (status = 202, body = CalibrationJobView, headers(("Location"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn create(

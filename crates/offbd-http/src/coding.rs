@@ -5,20 +5,18 @@ use std::io;
 use async_compression::codecs::zstd::params::DParameter;
 use async_compression::tokio::bufread::{GzipDecoder, ZstdDecoder};
 use axum::body::{Body, Bytes};
+use axum::http::HeaderMap;
 use axum::http::header::CONTENT_ENCODING;
-use axum::http::{HeaderMap, StatusCode};
 use futures_util::StreamExt;
 use futures_util::stream::BoxStream;
 use tokio::io::AsyncRead;
 use tokio_util::io::{ReaderStream, StreamReader};
 
 use super::Problem;
+use offbd_wire::problem::CONTENT_CODING;
 
 /// The codings that a request body may have, for `Accept-Encoding`.
 pub(super) const ACCEPTED_CODINGS: &str = "gzip, zstd";
-
-/// Last part of the problem type of a body in another coding.
-pub(super) const UNKNOWN_CODING: &str = "content-encoding";
 
 /// Largest window of zstd, as a power of two of bytes: a decoder must support 8 MiB and should
 /// refuse more (RFC 9659). The library would permit 128 MiB.
@@ -59,9 +57,7 @@ impl Coding {
                     "the content coding `{header}` is not supported; use one of \
                      {ACCEPTED_CODINGS}, or none"
                 );
-                let title = "Unsupported content coding";
-                let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-                Err(Problem::new(status, UNKNOWN_CODING, title, detail))
+                Err(Problem::new(CONTENT_CODING, detail))
             }
         }
     }

@@ -5,73 +5,119 @@
 //! program without `View`, and `SessionPage` for a page of `Session`s, which refers to its
 //! items instead of repeating them.
 
-use axum::http::StatusCode;
-use utoipa::openapi::path::{Operation, Parameter};
-use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, ObjectBuilder, Schema, Type};
-use utoipa::openapi::{Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Response};
+mod examples;
+mod flattened;
+mod sent_headers;
 
+use axum::http::StatusCode;
+use utoipa::openapi::path::{Operation, Parameter, ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::{AdditionalProperties, ArrayItems, ObjectBuilder, Schema, Type};
+use utoipa::openapi::{
+    Components, Content, ContentBuilder, OpenApi as Document, Ref, RefOr, Required, Response,
+};
+
+use serde_json::json;
+
+use self::examples::Examples;
 use super::routes::operations_mut;
+use offbd_wire::problem::{
+    BUSY, CHANGED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MEDIA_TYPE, MISDIRECTED, ProblemType,
+    SLOW_BODY, TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
+};
 
 const PROBLEM: &str = "application/problem+json";
 
-/// A response that operations share: its status, its component name, its description.
-type SharedResponse = (StatusCode, &'static str, &'static str);
+/// A response that operations share: a problem, its component name, its description.
+type SharedResponse = (&'static ProblemType, &'static str, &'static str);
 
-/// Responses of every operation.
-const ALWAYS: [SharedResponse; 3] = [
-    (
-        StatusCode::MISDIRECTED_REQUEST,
-        "MisdirectedRequest",
-        "Unknown host name in `Host`, while authentication is off",
-    ),
-    (StatusCode::TOO_MANY_REQUESTS, "TooManyRequests", "Too many requests; see `Retry-After`"),
-    (
-        StatusCode::SERVICE_UNAVAILABLE,
-        "ServiceUnavailable",
-        "Temporarily unavailable; see `Retry-After`",
-    ),
+/// Responses of every operation; the query is checked also where it has no parameters.
+const ALWAYS: [SharedResponse; 4] = [
+    (MALFORMED_QUERY, "InvalidParameter", "Invalid path or query parameter"),
+    (MISDIRECTED, "MisdirectedRequest", "Unknown host name in `Host`, while authentication is off"),
+    (BUSY, "TooManyRequests", "Too many requests; see `Retry-After`"),
+    (UNAVAILABLE, "ServiceUnavailable", "Temporarily unavailable; see `Retry-After`"),
 ];
 
 /// Responses of operations that require a token.
 const GUARDED: [SharedResponse; 2] = [
-    (StatusCode::UNAUTHORIZED, "Unauthorized", "No token, or an invalid one"),
+    (UNAUTHENTICATED, "Unauthorized", "No token, or an invalid one"),
     (
-        StatusCode::FORBIDDEN,
+        FORBIDDEN,
         "Forbidden",
         "The token has no such right, or the request comes from a page of another site",
     ),
 ];
 
-/// Responses of operations with parameters in path or query.
-const WITH_PARAMETERS: [SharedResponse; 1] =
-    [(StatusCode::BAD_REQUEST, "InvalidParameter", "Invalid path or query parameter")];
+/// Responses of operations that replace or delete what has an entity tag.
+const CONDITIONAL: [SharedResponse; 1] = [(
+    CHANGED,
+    "PreconditionFailed",
+    "Another edition than `If-Match` names; `etag` is the present one, if there is one",
+)];
 
 /// Responses of operations with a body.
-const WITH_BODY: [SharedResponse; 3] = [
-    (StatusCode::BAD_REQUEST, "MalformedBody", "Malformed body; `pointer` names the element"),
-    (StatusCode::REQUEST_TIMEOUT, "RequestTimeout", "The body was not received in time"),
-    (StatusCode::PAYLOAD_TOO_LARGE, "ContentTooLarge", "The body is too long"),
+const WITH_BODY: [SharedResponse; 4] = [
+    (MALFORMED, "MalformedBody", "Malformed body; `pointer` names the element"),
+    (SLOW_BODY, "RequestTimeout", "The body was not received in time"),
+    (TOO_LARGE, "ContentTooLarge", "The body is too long"),
+    (
+        MEDIA_TYPE,
+        "UnsupportedMediaType",
+        "Unsupported `Content-Type` or, with `Accept-Encoding`, `Content-Encoding`",
+    ),
 ];
 
 /// Returns `document` with the shared responses added to every operation, and with the public
 /// names of the schemas.
 pub(super) fn complete(mut document: Document) -> Document {
     for operation in document.paths.paths.values_mut().flat_map(operations_mut) {
+        shorten_summary(operation);
+        describe_conditions(operation);
         add_responses(operation);
-        operation.parameters.iter_mut().flatten().for_each(describe_if_match);
         for (code, response) in &mut operation.responses.responses {
             if let RefOr::T(response) = response {
                 complete_response(code, response);
             }
         }
     }
-    let shared = [&ALWAYS[..], &GUARDED, &WITH_PARAMETERS, &WITH_BODY].concat();
     let components = document.components.get_or_insert_default();
-    for (_, name, description) in shared {
-        components.responses.insert(name.to_owned(), problem(description).into());
-    }
+    add_shared(components);
     use_public_names(&mut document);
+    flattened::join_closed(&mut document.components.get_or_insert_default().schemas);
+    add_examples(&mut document);
     document
+}
+
+fn add_examples(document: &mut Document) {
+    let components = document.components.get_or_insert_default();
+    let examples = Examples::new(&components.schemas);
+    document.paths.paths.values_mut().flat_map(operations_mut).for_each(|o| examples.attach(o));
+    examples.add_to(components);
+}
+
+/// Leaves the first sentence in the summary of an operation, and moves the others to its
+/// description.
+fn shorten_summary(operation: &mut Operation) {
+    let Some(summary) = operation.summary.take() else { return };
+    let summary = summary.replace('\n', " ");
+    let Some((first, rest)) = summary.split_once(". ") else {
+        operation.summary = Some(summary);
+        return;
+    };
+    operation.summary = Some(format!("{first}."));
+    let further = operation.description.take().map(|text| format!("\n\n{text}"));
+    operation.description = Some(format!("{rest}{}", further.unwrap_or_default()));
+}
+
+/// Adds the responses and headers to which operations refer.
+fn add_shared(components: &mut Components) {
+    sent_headers::add_to(components);
+    let shared = [&ALWAYS[..], &GUARDED, &CONDITIONAL, &WITH_BODY].concat();
+    for (kind, name, description) in shared {
+        let mut response = problem(kind, description);
+        sent_headers::describe(&kind.status.to_string(), &mut response);
+        components.responses.insert(name.to_owned(), response.into());
+    }
 }
 
 /// Gives the schemas their public names, and lets pages refer to their items.
@@ -153,11 +199,15 @@ fn rename(schema: &mut RefOr<Schema>) {
     }
 }
 
-/// The values of `If-Match`: any edition, or entity tags (RFC 9110, section 13.1.1).
-const IF_MATCH: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
+/// The values of `If-Match` and `If-None-Match`: any edition, or entity tags (RFC 9110, sections
+/// 13.1.1 and 13.1.2).
+const CONDITION: &str = r#"^(\*|(W/)?"[!#-~]*"(, ?(W/)?"[!#-~]*")*)$"#;
 
 /// How the name of a page of items begins in the program.
 const PAGE: &str = "Page_";
+
+/// What the public name of a page of items ends with.
+const PAGE_SUFFIX: &str = "Page";
 
 /// How a reference to a schema begins.
 const SCHEMAS: &str = "#/components/schemas/";
@@ -165,45 +215,75 @@ const SCHEMAS: &str = "#/components/schemas/";
 fn public_name(name: &str) -> String {
     let without_view = |name: &str| name.strip_suffix("View").unwrap_or(name).to_owned();
     match name.strip_prefix(PAGE) {
-        Some(item) => format!("{}Page", without_view(item)),
+        Some(item) => format!("{}{PAGE_SUFFIX}", without_view(item)),
         None => without_view(name),
     }
 }
 
 fn add_responses(operation: &mut Operation) {
-    let with_parameters =
-        operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
+    // Of two responses with the same status the first one is described.
     let sets: [(bool, &[SharedResponse]); 4] = [
-        (true, &ALWAYS),
-        (operation.security.is_some(), &GUARDED),
         (operation.request_body.is_some(), &WITH_BODY),
-        (with_parameters, &WITH_PARAMETERS),
+        (operation.security.is_some(), &GUARDED),
+        (header(operation, "If-Match").is_some(), &CONDITIONAL),
+        (true, &ALWAYS),
     ];
     let sets = sets.into_iter().filter_map(|(applies, set)| applies.then_some(set));
-    for (status, name, _) in sets.flatten() {
+    for (kind, name, _) in sets.flatten() {
         let shared = || Ref::from_response_name(*name).into();
-        operation.responses.responses.entry(status.as_str().to_owned()).or_insert_with(shared);
+        operation.responses.responses.entry(kind.status.to_string()).or_insert_with(shared);
     }
 }
 
-/// Describes the values of `If-Match`, without null: a header is a text or is absent.
-fn describe_if_match(parameter: &mut RefOr<Parameter>) {
-    if let RefOr::T(parameter) = parameter
-        && parameter.name == "If-Match"
-    {
-        let schema = ObjectBuilder::new().schema_type(Type::String).pattern(Some(IF_MATCH));
-        parameter.schema = Some(schema.build().into());
+/// Describes the headers by which a request depends on the edition, and lets every response with
+/// an entity tag be left out if the client has it.
+fn describe_conditions(operation: &mut Operation) {
+    if let Some(parameter) = header(operation, "If-Match") {
+        *parameter = condition("If-Match", "Entity tag of the edition to replace; any without it");
+    }
+    let responses = &mut operation.responses.responses;
+    let is_tagged = responses.get("200").is_some_and(|response| match response {
+        RefOr::T(response) => response.headers.contains_key("ETag"),
+        RefOr::Ref(_) => false,
+    });
+    if is_tagged && operation.request_body.is_none() {
+        let unchanged = Response::new("The client has this edition");
+        responses.insert(StatusCode::NOT_MODIFIED.as_str().to_owned(), unchanged.into());
+        let description = "Entity tags of the editions that the client has";
+        let parameter = condition("If-None-Match", description);
+        operation.parameters.get_or_insert_default().push(parameter.into());
     }
 }
 
-fn problem(description: &str) -> Response {
-    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+/// Returns the description of a header that an operation has.
+fn header<'a>(operation: &'a mut Operation, name: &str) -> Option<&'a mut Parameter> {
+    operation.parameters.iter_mut().flatten().find_map(|parameter| match parameter {
+        RefOr::T(parameter) if parameter.name == name => Some(parameter),
+        _ => None,
+    })
+}
+
+/// Describes a header of a request with entity tags, without null: it is a text or is absent.
+fn condition(name: &str, description: &str) -> Parameter {
+    let schema = ObjectBuilder::new().schema_type(Type::String).pattern(Some(CONDITION));
+    let header = ParameterBuilder::new().name(name).parameter_in(ParameterIn::Header);
+    let header = header.required(Required::False).description(Some(description));
+    header.schema(Some(schema)).build()
+}
+
+/// Returns the description of a response with a problem, of which `kind` is an example.
+fn problem(kind: &ProblemType, description: &str) -> Response {
+    let example = json!({
+        "type": kind.uri(), "title": kind.title, "status": kind.status, "detail": description,
+        "instance": "urn:uuid:01a22327-7024-709a-a9fb-8a9966023fc9",
+    });
+    let content = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem")));
     let mut response = Response::new(description);
-    response.content.insert(PROBLEM.to_owned(), content.into());
+    response.content.insert(PROBLEM.to_owned(), content.example(Some(example)).build().into());
     response
 }
 
-/// Sets the description that OpenAPI requires, and the media type of problems.
+/// Sets the description that OpenAPI requires, the media type of problems, and the headers.
 fn complete_response(code: &str, response: &mut Response) {
     if response.description.is_empty() {
         let status = code.parse::<StatusCode>().ok();
@@ -221,11 +301,12 @@ fn complete_response(code: &str, response: &mut Response) {
     {
         response.content.insert(PROBLEM.to_owned(), content);
     }
+    sent_headers::describe(code, response);
 }
 
 #[cfg(test)]
 mod tests {
-    use serde_json::{Value, json};
+    use serde_json::Value;
 
     use super::*;
 

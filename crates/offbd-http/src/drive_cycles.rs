@@ -19,7 +19,7 @@ use offbd_wire::session_file::SessionFormat;
     operation_id = "get_drive_cycle",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, content((DriveCycleView = "application/json"),
-            (String = "text/csv"))),
+            (String = "text/csv")), headers(("Content-Disposition"))),
         (status = 404, body = Problem), (status = 406, body = Problem),
         (status = 409, body = Problem, description = "Not available; `detail` has the reason"),
         (status = 429, body = Problem)))]

@@ -1,14 +1,17 @@
-//! `ETag` and `If-Match`: the edition of what people edit (RFC 9110, sections 8.8.3 and 13.1.1).
+//! `ETag`, `If-Match` and `If-None-Match`: the edition of what people edit (RFC 9110, sections
+//! 8.8.3, 13.1.1 and 13.1.2).
 
 use axum::Json;
 use axum::extract::FromRequestParts;
-use axum::http::header::{ETAG, HeaderName, IF_MATCH};
+use axum::http::header::{ETAG, HeaderName, IF_MATCH, IF_NONE_MATCH};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 
 use super::Problem;
 use offbd_service::{Edition, Expected};
+use offbd_wire::problem::MALFORMED_CONDITION;
 
 /// The edition that the request may replace: any without `If-Match`.
 pub(super) struct IfMatch(pub(super) Expected);
@@ -17,17 +20,49 @@ impl<S: Send + Sync> FromRequestParts<S> for IfMatch {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        expected(&parts.headers).map(Self).ok_or_else(|| {
-            let detail = "`If-Match` must be `*`, or entity tags in quotes, separated by commas";
-            Problem::new(StatusCode::BAD_REQUEST, "if-match", "Malformed If-Match", detail)
-        })
+        parsed(&parts.headers, &IF_MATCH, "`If-Match`").map(Self)
     }
 }
 
-/// Returns what `If-Match` permits; `None` if it is malformed. A tag may be weak: proxies that
-/// compress a response make it weak, and the tags depend on the content alone.
-fn expected(headers: &HeaderMap) -> Option<Expected> {
-    let fields = headers.get_all(IF_MATCH).iter();
+/// The editions that the client has: none without `If-None-Match`.
+pub(super) struct IfNoneMatch(Expected);
+
+impl<S: Send + Sync> FromRequestParts<S> for IfNoneMatch {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        parsed(&parts.headers, &IF_NONE_MATCH, "`If-None-Match`").map(Self)
+    }
+}
+
+impl IfNoneMatch {
+    /// Returns a resource, or 304 with its entity tag if the client has this edition.
+    pub(super) fn answer<T: Serialize>(&self, tagged: Tagged<T>) -> Response {
+        let (headers, value) = tagged;
+        let tag = headers[0].1.trim_matches('"');
+        let is_known = match &self.0 {
+            Expected::Anything => false,
+            Expected::Existing => true,
+            Expected::OneOf(tags) => tags.iter().any(|known| known == tag),
+        };
+        if is_known {
+            return (StatusCode::NOT_MODIFIED, headers).into_response();
+        }
+        (headers, value).into_response()
+    }
+}
+
+fn parsed(headers: &HeaderMap, name: &HeaderName, shown: &str) -> Result<Expected, Problem> {
+    expected(headers, name).ok_or_else(|| {
+        let detail = format!("{shown} must be `*`, or entity tags in quotes, separated by commas");
+        Problem::new(MALFORMED_CONDITION, detail)
+    })
+}
+
+/// Returns the editions that the header `name` lists; `None` if it is malformed. A tag may be weak:
+/// proxies that compress a response make it weak, and the tags depend on the content alone.
+fn expected(headers: &HeaderMap, name: &HeaderName) -> Option<Expected> {
+    let fields = headers.get_all(name).iter();
     let fields: Vec<&str> = fields.map(|field| field.to_str().ok()).collect::<Option<_>>()?;
     match fields.as_slice() {
         [] => return Some(Expected::Anything),
@@ -74,7 +109,7 @@ mod tests {
     fn if_match_is_a_star_or_a_list_of_tags() {
         let parsed = |fields: &[&'static str]| {
             let fields = fields.iter().map(|field| (IF_MATCH, HeaderValue::from_static(field)));
-            expected(&fields.collect())
+            expected(&fields.collect(), &IF_MATCH)
         };
         let of = |tags: &[&str]| Some(Expected::OneOf(tags.iter().map(|&t| t.into()).collect()));
         assert_eq!(parsed(&[]), Some(Expected::Anything));

@@ -26,6 +26,7 @@ use super::assets::MAX_ASSET_BYTES;
 use super::coding::Coding;
 use super::credential::client_address;
 use offbd_service::{Route, Service, ServiceError};
+use offbd_wire::problem::TOO_LARGE;
 
 /// The header of a forwarded request, with the secret of the cluster.
 const FORWARDED: HeaderName = HeaderName::from_static("x-offbd-forwarded");
@@ -122,7 +123,7 @@ pub(super) async fn name_in_body(request: Request) -> Result<(Option<String>, Re
     parts.headers.remove(CONTENT_LENGTH);
     let bytes = axum::body::to_bytes(body, MAX_ASSET_BYTES).await.map_err(|_| {
         let detail = "the asset file is too long, or the request ended early";
-        Problem::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
+        Problem::new(TOO_LARGE, detail)
     })?;
     let named: Option<Named> = serde_json::from_slice(&bytes).ok();
     let request = Request::from_parts(parts, Body::from(bytes));

@@ -15,7 +15,7 @@ use axum::http::header::{
 };
 use axum::http::request::Parts;
 use axum::http::uri::Authority;
-use axum::http::{HeaderMap, Method, StatusCode, Uri};
+use axum::http::{HeaderMap, Method, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use axum::{RequestPartsExt, extract};
@@ -29,6 +29,7 @@ use super::rates::RateLimits;
 use super::routes::{RouteRule, RouteRules};
 use super::{App, Problem, problem};
 use offbd_service::access::{AccessScope, AuditEntry, Caller, Credential, Principal, Right};
+use offbd_wire::problem::{FORBIDDEN, MISDIRECTED, RATE, UNAUTHENTICATED};
 
 /// The configured access policy.
 pub struct AccessPolicy {
@@ -168,8 +169,7 @@ impl Guard {
         }
         let detail = "without authentication `Host` must be an IP address or localhost; \
             list the page's origin in `origins`, or set `auth = \"required\"`";
-        let status = StatusCode::MISDIRECTED_REQUEST;
-        Err(Problem::new(status, "misdirected", "Misdirected request", detail).into())
+        Err(Problem::new(MISDIRECTED, detail).into())
     }
 
     /// Denies unsafe requests from pages of other sites (cross-site request forgery), by
@@ -398,11 +398,11 @@ fn has_host(origin: &str, host: &Authority) -> bool {
 }
 
 fn forbidden(detail: &str) -> Problem {
-    Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail)
+    Problem::new(FORBIDDEN, detail)
 }
 
 fn unauthenticated(detail: &str, error: Option<&str>) -> Denial {
-    let problem = Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", "Unauthorized", detail);
+    let problem = Problem::new(UNAUTHENTICATED, detail);
     let error = error.map(|error| format!(", error=\"{error}\"")).unwrap_or_default();
     let challenge = HeaderValue::from_str(&format!("Bearer realm=\"offbd\"{error}")).ok();
     let problem = Box::new(problem);
@@ -412,8 +412,7 @@ fn unauthenticated(detail: &str, error: Option<&str>) -> Denial {
 fn rate_limited(wait: Duration) -> Denial {
     let seconds = wait.as_secs() + 1;
     let detail = format!("too many requests; retry after {seconds} s");
-    let title = "Rate limit exceeded";
-    let problem = Problem::new(StatusCode::TOO_MANY_REQUESTS, "rate", title, detail);
+    let problem = Problem::new(RATE, detail);
     let problem = Box::new(problem);
     Denial { problem, header: Some(Box::new((RETRY_AFTER, HeaderValue::from(seconds)))) }
 }

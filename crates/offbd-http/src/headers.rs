@@ -7,7 +7,7 @@ use axum::extract::Request;
 use axum::http::Method;
 use axum::http::header::{
     ACCEPT, AUTHORIZATION, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_SECURITY_POLICY, CONTENT_TYPE,
-    ETAG, HeaderName, HeaderValue, IF_MATCH, LOCATION, REFERRER_POLICY, RETRY_AFTER,
+    ETAG, HeaderName, HeaderValue, IF_MATCH, IF_NONE_MATCH, LOCATION, REFERRER_POLICY, RETRY_AFTER,
     STRICT_TRANSPORT_SECURITY, WWW_AUTHENTICATE, X_CONTENT_TYPE_OPTIONS,
 };
 use axum::middleware::Next;
@@ -71,6 +71,7 @@ pub(super) fn cors(origins: &[String]) -> CorsLayer {
             CONTENT_ENCODING,
             CONTENT_TYPE,
             IF_MATCH,
+            IF_NONE_MATCH,
             HeaderName::from_static("last-event-id"),
         ])
         .expose_headers([

@@ -2,12 +2,13 @@
 
 use axum::body::Body;
 use axum::extract::{FromRequest, Request};
+use axum::http::HeaderMap;
 use axum::http::header::CONTENT_TYPE;
-use axum::http::{HeaderMap, StatusCode};
 use serde::de::DeserializeOwned;
 
 use super::{App, Problem, body};
 use offbd_wire::json;
+use offbd_wire::problem::MEDIA_TYPE;
 
 /// Size limit of a small JSON body, bytes; a longer one is answered with 413.
 const MAX_SMALL_BYTES: usize = 16 << 10;
@@ -71,8 +72,7 @@ fn check_media_type(headers: &HeaderMap, body: &[u8]) -> Result<(), Problem> {
         None => "a body without `Content-Type`".to_owned(),
     };
     let detail = format!("{found} is not supported; use application/json");
-    let title = "Unsupported media type";
-    Err(Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "media-type", title, detail))
+    Err(Problem::new(MEDIA_TYPE, detail))
 }
 
 /// Whether a media type is JSON, or a format on its basis such as `application/merge+json`.

@@ -22,6 +22,7 @@ use tracing::Span;
 use tracing::field::Empty;
 
 use offbd_net::unread_body;
+use offbd_wire::problem::{FAILED, SLOW};
 
 use super::{AccessPolicy, Problem, headers};
 
@@ -93,8 +94,7 @@ async fn limit_time(request: Request, next: Next) -> Response {
     let limit = if import { IMPORT_TIMEOUT } else { ANSWER_TIMEOUT };
     tokio::time::timeout(limit, next.run(request)).await.unwrap_or_else(|_| {
         let detail = format!("no response within {} s; retry the request", limit.as_secs());
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "slow", "Request timed out", detail)
-            .into_response()
+        Problem::new(SLOW, detail).into_response()
     })
 }
 
@@ -138,6 +138,5 @@ fn panicked(panic: Box<dyn Any + Send>) -> Response {
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
     tracing::error!(panic = text.unwrap_or_default(), "a request handler panicked");
     let detail = "the request failed with an internal error; see the log for the request id";
-    Problem::new(StatusCode::INTERNAL_SERVER_ERROR, "failed", "Internal error", detail)
-        .into_response()
+    Problem::new(FAILED, detail).into_response()
 }

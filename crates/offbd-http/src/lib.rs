@@ -30,6 +30,7 @@ mod guard;
 mod headers;
 mod jobs;
 mod json_body;
+mod json_schema;
 mod layers;
 mod learning;
 mod login;
@@ -120,6 +121,8 @@ impl FromRef<App> for Service {
             Lengths are in metres, angles in radians, sample times in seconds on the device's \
             clock. Timestamps of the service are RFC 3339.",
     ),
+    // The service that the description comes from.
+    servers((url = "/")),
     components(schemas(
         offbd_wire::service::EventView,
         offbd_wire::words::SessionSort,
@@ -244,8 +247,15 @@ struct PageQuery {
 }
 
 /// Public paths that are not operations: the API description and its viewer.
-const OPEN_PAGES: [&str; 6] =
-    ["/openapi.yaml", "/openapi.json", "/asyncapi.yaml", "/docs", "/docs/", "/docs/{*rest}"];
+const OPEN_PAGES: [&str; 7] = [
+    "/openapi.yaml",
+    "/openapi.json",
+    "/asyncapi.yaml",
+    "/asset.schema.json",
+    "/docs",
+    "/docs/",
+    "/docs/{*rest}",
+];
 
 /// Returns the OpenAPI document.
 #[must_use]
@@ -259,6 +269,14 @@ pub fn openapi_yaml() -> String {
     openapi().to_yaml().unwrap_or_else(|error| format!("# {error}\n"))
 }
 
+/// Returns the JSON Schema of an asset file, as committed in `docs/asset.schema.json`.
+#[must_use]
+pub fn asset_schema() -> String {
+    let mut schema = json_schema::of("Asset");
+    schema["title"] = "Asset file of offbd".into();
+    format!("{schema:#}\n")
+}
+
 /// Returns the router of everything that is served: the API, its description, the
 /// dashboard, and `extra`.
 pub fn router(app: App, extra: ExtraRoutes) -> Router {
@@ -268,14 +286,17 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     let document = description::complete(document);
     let mut rules = RouteRules::new(&document);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
-    let yaml: Arc<str> = document.to_yaml().unwrap_or_default().into();
-    let messages: Arc<str> = asyncapi_yaml().into();
+    let yaml = document.to_yaml().unwrap_or_default();
     let policy = app.policy.clone();
     let forwarder = Forwarder::default();
     let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: forwarder.clone() });
     let router = router
-        .route("/openapi.yaml", axum::routing::get(move || operations::yaml(yaml)))
-        .route("/asyncapi.yaml", axum::routing::get(move || operations::yaml(messages)))
+        .route("/openapi.yaml", operations::document("application/yaml", yaml))
+        .route("/asyncapi.yaml", operations::document("application/yaml", asyncapi_yaml()))
+        .route(
+            "/asset.schema.json",
+            operations::document("application/schema+json", asset_schema()),
+        )
         .merge(
             Router::<App>::from(SwaggerUi::new("/docs").url("/openapi.json", document))
                 .layer(axum::middleware::map_response(page::named_docs)),

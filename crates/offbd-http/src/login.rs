@@ -15,6 +15,7 @@ use super::json_body::JsonBody;
 use super::{App, Problem};
 use offbd_service::access::{AuditEntry, Caller, Credential, Role};
 use offbd_wire::access::CallerView;
+use offbd_wire::problem::UNAUTHENTICATED;
 use offbd_wire::words::AuthenticationWord;
 
 /// Path of the login resource.
@@ -45,8 +46,9 @@ fn view(caller: &Caller) -> CallerView {
 /// week, or until the token expires or is revoked.
 #[utoipa::path(post, path = "/login", tag = "access", operation_id = "log_in",
     request_body = NewLogin,
-    responses((status = 200, body = CallerView), (status = 400, body = Problem),
+    responses((status = 200, body = CallerView, headers(("Set-Cookie"))), (status = 400, body = Problem),
         (status = 401, body = Problem, description = "Invalid, expired or revoked token"),
+        (status = 403, body = Problem, description = "The request comes from a page of another site"),
         (status = 422, body = Problem)))]
 pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<Response, Problem> {
     let address = client_address(request.extensions()).map(|address| address.to_string());
@@ -57,8 +59,7 @@ pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<R
     let Some(principal) = app.service.authenticate(&Credential::token(login.token.trim())).await?
     else {
         let detail = "unknown, revoked or expired token";
-        let title = "Unauthorized";
-        return Err(Problem::new(StatusCode::UNAUTHORIZED, "unauthenticated", title, detail));
+        return Err(Problem::new(UNAUTHENTICATED, detail));
     };
     let (secret, duration) = app.service.log_in(&principal).await?;
     let caller = Caller::Authenticated(principal);
@@ -78,7 +79,7 @@ pub(super) async fn get(Extension(caller): Extension<Caller>) -> Json<CallerView
 
 /// Logs a browser out and invalidates its cookie.
 #[utoipa::path(delete, path = "/login", tag = "access", operation_id = "log_out",
-    responses((status = 204)))]
+    responses((status = 204, headers(("Set-Cookie")))))]
 pub(super) async fn log_out(
     State(app): State<App>,
     Extension(caller): Extension<Caller>,

@@ -4,10 +4,10 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::http::header::LOCATION;
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use super::edition::{IfMatch, Tagged, with_tag};
+use super::edition::{IfMatch, IfNoneMatch, Tagged, with_tag};
 use super::json_body::JsonBody;
 use super::{App, Path, Problem, Query, page_limit, query_word};
 use offbd_core::vocabulary::Invalid;
@@ -40,7 +40,7 @@ pub(super) async fn channels(
 /// response.
 #[utoipa::path(post, path = "/notifications/channels", tag = "notifications",
     operation_id = "create_channel", request_body = NewChannelView,
-    responses((status = 201, body = MadeChannelView), (status = 400, body = Problem),
+    responses((status = 201, body = MadeChannelView, headers(("Location"))), (status = 400, body = Problem),
         (status = 409, body = Problem, description = "The name is taken, or too many channels"),
         (status = 422, body = Problem)))]
 pub(super) async fn create_channel(
@@ -55,25 +55,25 @@ pub(super) async fn create_channel(
 /// Returns a channel, without its secrets.
 #[utoipa::path(get, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "get_channel", params(("channel" = String, description = "Id of the channel")),
-    responses((status = 200, body = ChannelView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = ChannelView, headers(("ETag"))),
         (status = 404, body = Problem)))]
 pub(super) async fn channel(
     State(service): State<Service>,
     Path(channel): Path<String>,
-) -> Result<Tagged<ChannelView>, Problem> {
+    known: IfNoneMatch,
+) -> Result<Response, Problem> {
     let channel = service.channel(&channel).await?;
-    Ok(with_tag(channel.etag.clone(), channel))
+    Ok(known.answer(with_tag(channel.etag.clone(), channel)))
 }
 
 /// Replaces the settings of a channel. A secret or password that is not given stays.
 #[utoipa::path(put, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "put_channel", params(("channel" = String, description = "Id of the channel"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+        ("If-Match" = Option<String>, Header)),
     request_body = NewChannelView,
-    responses((status = 200, body = MadeChannelView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = MadeChannelView, headers(("ETag"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "The name is taken"),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
         (status = 422, body = Problem)))]
 pub(super) async fn put_channel(
     State(app): State<App>,
@@ -89,10 +89,9 @@ pub(super) async fn put_channel(
 #[utoipa::path(delete, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "delete_channel",
     params(("channel" = String, description = "Id of the channel"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+        ("If-Match" = Option<String>, Header)),
     responses((status = 204), (status = 404, body = Problem),
-        (status = 409, body = Problem, description = "A rule uses it"),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
+        (status = 409, body = Problem, description = "A rule uses it")))]
 pub(super) async fn delete_channel(
     State(service): State<Service>,
     Path(channel): Path<String>,
@@ -107,7 +106,7 @@ pub(super) async fn delete_channel(
 #[utoipa::path(post, path = "/notifications/channels/{channel}/test", tag = "notifications",
     operation_id = "test_channel",
     params(("channel" = String, description = "Id of the channel")),
-    responses((status = 202, body = DeliveryView), (status = 404, body = Problem)))]
+    responses((status = 202, body = DeliveryView, headers(("Location"))), (status = 404, body = Problem)))]
 pub(super) async fn test(
     State(service): State<Service>,
     Path(channel): Path<String>,
@@ -127,7 +126,7 @@ pub(super) async fn rules(State(service): State<Service>) -> Result<Json<Page<Ru
 /// Creates a rule, which is for the changes from now on.
 #[utoipa::path(post, path = "/notifications/rules", tag = "notifications",
     operation_id = "create_rule", request_body = NewRuleView,
-    responses((status = 201, body = RuleView), (status = 400, body = Problem),
+    responses((status = 201, body = RuleView, headers(("Location"))), (status = 400, body = Problem),
         (status = 409, body = Problem, description = "Too many rules"),
         (status = 422, body = Problem)))]
 pub(super) async fn create_rule(
@@ -142,24 +141,24 @@ pub(super) async fn create_rule(
 /// Returns a rule.
 #[utoipa::path(get, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "get_rule", params(("rule" = String, description = "Id of the rule")),
-    responses((status = 200, body = RuleView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = RuleView, headers(("ETag"))),
         (status = 404, body = Problem)))]
 pub(super) async fn rule(
     State(service): State<Service>,
     Path(rule): Path<String>,
-) -> Result<Tagged<RuleView>, Problem> {
+    known: IfNoneMatch,
+) -> Result<Response, Problem> {
     let rule = service.rule(&rule).await?;
-    Ok(with_tag(rule.etag.clone(), rule))
+    Ok(known.answer(with_tag(rule.etag.clone(), rule)))
 }
 
 /// Replaces a rule.
 #[utoipa::path(put, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "put_rule", params(("rule" = String, description = "Id of the rule"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+        ("If-Match" = Option<String>, Header)),
     request_body = NewRuleView,
-    responses((status = 200, body = RuleView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = RuleView, headers(("ETag"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
         (status = 422, body = Problem)))]
 pub(super) async fn put_rule(
     State(app): State<App>,
@@ -174,9 +173,8 @@ pub(super) async fn put_rule(
 /// Deletes a rule, with its reminders.
 #[utoipa::path(delete, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "delete_rule", params(("rule" = String, description = "Id of the rule"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
-    responses((status = 204), (status = 404, body = Problem),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`")))]
+        ("If-Match" = Option<String>, Header)),
+    responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn delete_rule(
     State(service): State<Service>,
     Path(rule): Path<String>,

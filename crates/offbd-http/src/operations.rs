@@ -1,11 +1,10 @@
 //! Health, readiness and the descriptions of the interface.
 
-use std::sync::Arc;
-
 use axum::Json;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
-use axum::response::IntoResponse;
+use axum::routing::MethodRouter;
+use bytes::Bytes;
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -63,6 +62,8 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
     Ok(healthy(&app))
 }
 
-pub(super) async fn yaml(yaml: Arc<str>) -> impl IntoResponse {
-    ([(CONTENT_TYPE, "application/yaml")], yaml.to_string())
+/// Returns the route of a document that does not change.
+pub(super) fn document(media_type: &'static str, text: String) -> MethodRouter<App> {
+    let text = Bytes::from(text);
+    axum::routing::get(async move || ([(CONTENT_TYPE, media_type)], text.clone()))
 }

@@ -10,18 +10,18 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::coding::{ACCEPTED_CODINGS, UNKNOWN_CODING};
+use super::coding::ACCEPTED_CODINGS;
 use super::retry::retry_after_s;
 use offbd_core::vocabulary::Invalid;
 use offbd_service::{EntityTag, RETRY_AFTER_S, ServiceError};
-use offbd_wire::PROBLEM_TYPE;
+use offbd_wire::problem::{self as types, ProblemType};
 use offbd_wire::sovd::SovdErrorView;
 use offbd_wire::telemetry::BatchError;
 
 /// An error (`application/problem+json`, RFC 9457).
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub struct Problem {
-    /// URI of the problem type.
+    /// URI of the problem type, one of those in `docs/operations/problems.md`.
     #[serde(rename = "type")]
     pub kind: Box<str>,
     /// Summary of the problem type.
@@ -53,17 +53,12 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Returns a problem of the type `urn:offbd:problem:{slug}`.
-    pub fn new(
-        status: StatusCode,
-        slug: &str,
-        title: &'static str,
-        detail: impl Into<String>,
-    ) -> Self {
+    /// Returns a problem of the type `kind`.
+    pub fn new(kind: &ProblemType, detail: impl Into<String>) -> Self {
         Self {
-            kind: format!("{PROBLEM_TYPE}{slug}").into(),
-            title,
-            status: status.as_u16(),
+            kind: kind.uri().into(),
+            title: kind.title,
+            status: kind.status,
             detail: detail.into().into(),
             pointer: None,
             parameter: None,
@@ -119,7 +114,7 @@ impl IntoResponse for Problem {
         }
         // Only then: with the header a 415 speaks of the coding, not of the media type
         // (RFC 9110, section 12.5.3).
-        if self.kind.ends_with(UNKNOWN_CODING) {
+        if *self.kind == *types::CONTENT_CODING.uri() {
             headers.insert(ACCEPT_ENCODING, HeaderValue::from_static(ACCEPTED_CODINGS));
         }
         response.extensions_mut().insert(self);
@@ -131,74 +126,59 @@ impl From<ServiceError> for Problem {
     fn from(error: ServiceError) -> Self {
         use ServiceError as E;
         let detail = error.to_string();
-        let new = |status, slug, title| Self::new(status, slug, title, detail.clone());
-        let missing = |slug, title| new(StatusCode::NOT_FOUND, slug, title);
-        let conflict = |slug, title| new(StatusCode::CONFLICT, slug, title);
+        let new = |kind| Self::new(kind, detail.clone());
         match error {
-            E::UnknownAsset { .. } => missing("unknown-asset", "No such asset"),
-            E::UnknownSession { .. } => missing("unknown-session", "No such session"),
-            E::UnknownReplay { .. } => missing("unknown-replay", "No such replay"),
-            E::UnknownRemark { .. } => missing("unknown-remark", "No such remark"),
-            E::UnknownCalibration { .. } => missing("unknown-calibration", "No such calibration"),
-            E::UnknownToken { .. } => missing("unknown-token", "No such token"),
-            E::UnknownChannel { .. } => missing("unknown-channel", "No such channel"),
-            E::UnknownRule { .. } => missing("unknown-rule", "No such rule"),
-            E::UnknownDelivery { .. } => missing("unknown-delivery", "No such delivery"),
-            E::ChannelExists { .. } => conflict("channel-exists", "Channel already exists"),
-            E::ChannelInUse { .. } => conflict("channel-in-use", "Channel is in use"),
-            E::TooManySettings { .. } => conflict("too-many", "Limit reached"),
-            E::UnknownCode(_) => missing("unknown-code", "No such fault code"),
-            E::NoRecording { .. } => missing("no-recording", "No recording"),
-            E::AssetExists { .. } => conflict("asset-exists", "Asset already exists"),
-            E::TokenExists { .. } => conflict("token-exists", "Token name already in use"),
-            E::SessionExists { .. } => conflict("session-exists", "Session already exists"),
-            E::SessionEnded { .. } => conflict("session-ended", "Session has ended"),
-            E::NothingToAcknowledge { .. } => {
-                conflict("nothing-to-acknowledge", "No current occurrence")
-            }
-            E::NoDriveCycle(_) => conflict("no-drive-cycle", "No drive cycle"),
-            E::JobEnded { .. } => conflict("job-ended", "Job neither waits nor runs"),
-            E::NotDone { .. } => conflict("not-done", "Calibration not done"),
-            E::NothingOffered { .. } => conflict("nothing-offered", "No calibration offered"),
-            E::AlreadyLearnt { .. } => conflict("already-learnt", "Rig already calibrated"),
+            E::UnknownAsset { .. } => new(types::UNKNOWN_ASSET),
+            E::UnknownSession { .. } => new(types::UNKNOWN_SESSION),
+            E::UnknownReplay { .. } => new(types::UNKNOWN_REPLAY),
+            E::UnknownRemark { .. } => new(types::UNKNOWN_REMARK),
+            E::UnknownCalibration { .. } => new(types::UNKNOWN_CALIBRATION),
+            E::UnknownToken { .. } => new(types::UNKNOWN_TOKEN),
+            E::UnknownChannel { .. } => new(types::UNKNOWN_CHANNEL),
+            E::UnknownRule { .. } => new(types::UNKNOWN_RULE),
+            E::UnknownDelivery { .. } => new(types::UNKNOWN_DELIVERY),
+            E::ChannelExists { .. } => new(types::CHANNEL_EXISTS),
+            E::ChannelInUse { .. } => new(types::CHANNEL_IN_USE),
+            E::TooManySettings { .. } => new(types::TOO_MANY_SETTINGS),
+            E::UnknownCode(_) => new(types::UNKNOWN_CODE),
+            E::NoRecording { .. } => new(types::NO_RECORDING),
+            E::AssetExists { .. } => new(types::ASSET_EXISTS),
+            E::TokenExists { .. } => new(types::TOKEN_EXISTS),
+            E::SessionExists { .. } => new(types::SESSION_EXISTS),
+            E::SessionEnded { .. } => new(types::SESSION_ENDED),
+            E::NothingToAcknowledge { .. } => new(types::NOTHING_TO_ACKNOWLEDGE),
+            E::NoDriveCycle(_) => new(types::NO_DRIVE_CYCLE),
+            E::JobEnded { .. } => new(types::JOB_ENDED),
+            E::NotDone { .. } => new(types::NOT_DONE),
+            E::NothingOffered { .. } => new(types::NOTHING_OFFERED),
+            E::AlreadyLearnt { .. } => new(types::ALREADY_LEARNT),
             E::Changed { now } => {
                 let etag = now.map(Box::new);
-                Self {
-                    etag,
-                    ..new(StatusCode::PRECONDITION_FAILED, "changed", "Changed meanwhile")
-                }
+                Self { etag, ..new(types::CHANGED) }
             }
             E::Invalid(invalid) => Self::from(invalid),
             E::Batch(batch) => Self::from(batch),
-            E::TooMany { .. } => {
-                new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large")
-            }
-            E::RegistryFull { .. } => {
-                new(StatusCode::INSUFFICIENT_STORAGE, "registry-full", "Asset limit reached")
-            }
+            E::TooMany { .. } => new(types::TOO_LARGE),
+            E::RegistryFull { .. } => new(types::REGISTRY_FULL),
             E::Busy { .. } => {
                 let retry_after_s = retry_after_s();
-                let status = StatusCode::TOO_MANY_REQUESTS;
-                Self { retry_after_s, ..new(status, "busy", "Too many requests") }
+                Self { retry_after_s, ..new(types::BUSY) }
             }
-            E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => {
-                new(StatusCode::SERVICE_UNAVAILABLE, "unavailable", "Service unavailable")
-            }
+            E::Unavailable { .. } | E::Outage { .. } | E::Stalled { .. } => new(types::UNAVAILABLE),
             E::Rebuilding { retry_after_s } => {
-                let status = StatusCode::SERVICE_UNAVAILABLE;
                 let retry_after_s = u32::try_from(retry_after_s).unwrap_or(u32::MAX);
-                Self { retry_after_s, ..new(status, "rebuilding", "Engine is being rebuilt") }
+                Self { retry_after_s, ..new(types::REBUILDING) }
             }
-            E::Moving => new(StatusCode::SERVICE_UNAVAILABLE, "moving", "Asset is moving"),
-            E::NotStored { .. } => new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error"),
+            E::Moving => new(types::MOVING),
+            E::NotStored { .. } => new(types::STORE),
             E::Store(_) => {
                 tracing::error!(error = detail, "the store failed");
                 let detail = "the store failed; unacknowledged data were not stored, retry";
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "store", "Store error", detail)
+                Self::new(types::STORE, detail)
             }
             E::Corrupt { .. } => {
                 tracing::error!(error = detail, "the store is corrupt");
-                new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Corrupt data in the store")
+                new(types::CORRUPT)
             }
         }
     }
@@ -210,17 +190,14 @@ impl From<Invalid> for Problem {
     fn from(invalid: Invalid) -> Self {
         let detail = invalid.to_string();
         if let Some(parameter) = invalid.element.strip_prefix('?') {
-            let title = "Invalid query parameter";
-            let problem = Self::new(StatusCode::BAD_REQUEST, "query", title, detail);
+            let problem = Self::new(types::MALFORMED_QUERY, detail);
             return Self { parameter: Some(parameter.into()), ..problem };
         }
         if invalid.element.is_empty() {
-            let title = "Malformed body";
             let detail = invalid.reason;
-            return Self::new(StatusCode::BAD_REQUEST, "malformed", title, detail).at("");
+            return Self::new(types::MALFORMED, detail).at("");
         }
-        let title = "Invalid value";
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid", title, detail).at(&invalid.element)
+        Self::new(types::INVALID, detail).at(&invalid.element)
     }
 }
 
@@ -229,34 +206,30 @@ impl From<BatchError> for Problem {
         let detail = error.to_string();
         match error {
             BatchError::Malformed { pointer, .. } => {
-                let title = "Malformed body";
-                Self::new(StatusCode::BAD_REQUEST, "malformed", title, detail).at(&pointer)
+                Self::new(types::MALFORMED, detail).at(&pointer)
             }
-            BatchError::TooMany { .. } => {
-                Self::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Content too large", detail)
-            }
+            BatchError::TooMany { .. } => Self::new(types::TOO_LARGE, detail),
         }
     }
 }
 
 impl From<QueryRejection> for Problem {
     fn from(rejection: QueryRejection) -> Self {
-        let title = "Invalid query parameter";
         tracing::debug!(%rejection, "the description permits a query that is not understood");
-        Self::new(StatusCode::BAD_REQUEST, "query", title, "the query cannot be understood")
+        Self::new(types::MALFORMED_QUERY, "the query cannot be understood")
     }
 }
 
 impl From<PathRejection> for Problem {
     fn from(rejection: PathRejection) -> Self {
         tracing::debug!(%rejection, "invalid path");
-        Self::new(StatusCode::BAD_REQUEST, "path", "Invalid path", "the path is not valid UTF-8")
+        Self::new(types::MALFORMED_PATH, "the path is not valid UTF-8")
     }
 }
 
 pub(super) async fn not_found(uri: Uri) -> Problem {
     let detail = format!("no route matches {}; see /openapi.yaml", uri.path());
-    Problem::new(StatusCode::NOT_FOUND, "unknown-path", "No such path", detail)
+    Problem::new(types::UNKNOWN_PATH, detail)
 }
 
 pub(super) async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
@@ -265,5 +238,5 @@ pub(super) async fn method_not_allowed(method: Method, uri: Uri) -> Problem {
 
 pub(super) fn not_allowed(method: &Method, uri: &Uri) -> Problem {
     let detail = format!("{} does not support {method}", uri.path());
-    Problem::new(StatusCode::METHOD_NOT_ALLOWED, "method", "Method not allowed", detail)
+    Problem::new(types::METHOD_NOT_ALLOWED, detail)
 }

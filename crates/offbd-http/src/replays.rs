@@ -17,7 +17,7 @@ use offbd_wire::service::{ReplaySettingsView, ReplayView};
     operation_id = "replay_session",
     params(("id" = String, description = "The service's id of the session")),
     request_body = Option<ReplaySettingsView>,
-    responses((status = 202, body = ReplayView, description = "`Location` has the replay's URL"),
+    responses((status = 202, body = ReplayView, headers(("Location"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub(super) async fn create(

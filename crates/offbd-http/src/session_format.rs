@@ -2,11 +2,12 @@
 
 use std::fmt::Display;
 
+use axum::http::HeaderMap;
 use axum::http::header::{ACCEPT, CONTENT_TYPE};
-use axum::http::{HeaderMap, StatusCode};
 
 use super::Problem;
 use super::negotiate::weight_of_first;
+use offbd_wire::problem::{MEDIA_TYPE, NOT_ACCEPTABLE};
 use offbd_wire::session_file::{SessionFileError, SessionFormat};
 use offbd_wire::telemetry::BatchError;
 
@@ -48,7 +49,7 @@ pub(super) fn negotiate(
         || format!("`{accept}` is not available; use {}", list(offered)),
         |error| error.to_string(),
     );
-    Err(Problem::new(StatusCode::NOT_ACCEPTABLE, "not-acceptable", "Not acceptable", detail))
+    Err(Problem::new(NOT_ACCEPTABLE, detail))
 }
 
 /// The weight of `format` in the header `Accept`.
@@ -101,9 +102,7 @@ pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Prob
 }
 
 fn unsupported(detail: impl Display) -> Problem {
-    let title = "Unsupported media type";
-    let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-    Problem::new(status, "media-type", title, detail.to_string())
+    Problem::new(MEDIA_TYPE, detail.to_string())
 }
 
 impl From<SessionFileError> for Problem {

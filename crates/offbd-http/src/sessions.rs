@@ -131,7 +131,7 @@ fn created<T: serde::Serialize>(id: &str, view: T) -> impl IntoResponse + use<T>
 #[utoipa::path(post, path = "/assets/{asset}/sessions", tag = "sessions",
     operation_id = "open_session", params(("asset" = String, description = "Name of the asset")),
     request_body = Option<NewSession>,
-    responses((status = 201, body = SessionView), (status = 404, body = Problem),
+    responses((status = 201, body = SessionView, headers(("Location"))), (status = 404, body = Problem),
         (status = 409, body = Problem, description = "A session of this name exists"),
         (status = 422, body = Problem)))]
 pub(super) async fn open(
@@ -163,7 +163,7 @@ pub(super) async fn open(
         (BinaryFile = "application/vnd.apache.arrow.stream"),
         (BinaryFile = "application/vnd.mcap"),
         (BinaryFile = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"))),
-    responses((status = 201, body = ImportView),
+    responses((status = 201, body = ImportView, headers(("Location"))),
         (status = 200, body = InspectionView, description = "With `dry_run`"),
         (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 409, body = Problem),
@@ -307,7 +307,7 @@ pub(super) struct RecordingRangeQuery {
             (offbd_wire::telemetry::RowsView = "application/json"),
             (BinaryFile = "application/vnd.apache.parquet"),
             (BinaryFile = "application/vnd.apache.arrow.stream"),
-            (BinaryFile = "application/vnd.mcap"))),
+            (BinaryFile = "application/vnd.mcap")), headers(("Content-Disposition"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
         (status = 406, body = Problem)))]
 pub(super) async fn telemetry(

@@ -11,7 +11,6 @@ use std::time::Duration;
 
 use axum::Extension;
 use axum::extract::State;
-use axum::http::StatusCode;
 use axum::response::Response;
 use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::{Deserialize, Serialize};
@@ -29,6 +28,7 @@ use offbd_core::vocabulary::Invalid;
 use offbd_service::access::{Caller, Right};
 use offbd_service::{Event, EventFeed, PendingBatch, Service, ServiceError};
 use offbd_wire::bus::BatchAckView;
+use offbd_wire::problem::FORBIDDEN;
 use offbd_wire::service::{StateView, TraceCursor};
 use offbd_wire::telemetry::{AckView, TelemetryFormat};
 use offbd_wire::trace::TraceView;
@@ -384,7 +384,7 @@ impl StreamConnection {
         let memory = self.socket.get_mut().take_reserved();
         if !self.may_send {
             let detail = "the token does not permit sending telemetry of this asset";
-            let problem = Problem::new(StatusCode::FORBIDDEN, "forbidden", "Forbidden", detail);
+            let problem = Problem::new(FORBIDDEN, detail);
             let refused = StreamErrorView { id: None, problem };
             return self.send_messages(vec![text(&StreamFrameView::Error(refused))]).await;
         }

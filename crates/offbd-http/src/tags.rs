@@ -2,8 +2,9 @@
 
 use axum::Json;
 use axum::extract::State;
+use axum::response::Response;
 
-use super::edition::{IfMatch, Tagged, tagged};
+use super::edition::{IfMatch, IfNoneMatch, Tagged, tagged};
 use super::json_body::JsonBody;
 use super::{AssetPath, PageQuery, Problem, Query, page_limit};
 use offbd_service::Service;
@@ -24,24 +25,24 @@ pub(super) async fn list(
 /// Returns the tags of an asset, in alphabetical order.
 #[utoipa::path(get, path = "/assets/{asset}/tags", tag = "assets", operation_id = "get_tags",
     params(("asset" = String, description = "Name of the asset")),
-    responses((status = 200, body = TagsView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = TagsView, headers(("ETag"))),
         (status = 404, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,
     AssetPath(asset): AssetPath,
-) -> Result<Tagged<TagsView>, Problem> {
-    Ok(tagged(service.tags(&asset).await?))
+    known: IfNoneMatch,
+) -> Result<Response, Problem> {
+    Ok(known.answer(tagged(service.tags(&asset).await?)))
 }
 
 /// Replaces the tags of an asset. They group assets in lists and in rules of notifications, and
 /// change no verdict.
 #[utoipa::path(put, path = "/assets/{asset}/tags", tag = "assets", operation_id = "put_tags",
     params(("asset" = String, description = "Name of the asset"),
-        ("If-Match" = Option<String>, Header, description = "Entity tag of the edition to replace; any without it")),
+        ("If-Match" = Option<String>, Header)),
     request_body = TagsView,
-    responses((status = 200, body = TagsView, headers(("ETag" = String, description = "Entity tag of the edition, for `If-Match`"))),
+    responses((status = 200, body = TagsView, headers(("ETag"))),
         (status = 400, body = Problem), (status = 404, body = Problem),
-        (status = 412, body = Problem, description = "Another edition than `If-Match` names; see `etag`"),
         (status = 422, body = Problem, description = "Invalid tag; `pointer` names it")))]
 pub(super) async fn put(
     State(service): State<Service>,

@@ -2,23 +2,23 @@
 
 use axum::body::Body;
 use axum::extract::State;
+use axum::http::HeaderMap;
 use axum::http::header::CONTENT_TYPE;
-use axum::http::{HeaderMap, StatusCode};
 use axum::{Extension, Json};
 use serde::Deserialize;
 
 use super::body::BodyShare;
 use super::{App, AssetPath, Problem, Query, body};
 use offbd_core::vocabulary::Invalid;
+use offbd_wire::problem::MEDIA_TYPE;
 use offbd_wire::telemetry::{AckView, RowsView, TelemetryFormat};
 
 /// Returns the format in `Content-Type`; JSON without the header.
 fn format(headers: &HeaderMap) -> Result<TelemetryFormat, Problem> {
     let header = headers.get(CONTENT_TYPE).map(|header| header.to_str().unwrap_or_default());
-    header.map_or(Ok(TelemetryFormat::Json), TelemetryFormat::of_type).map_err(|error| {
-        let title = "Unsupported media type";
-        Problem::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, "media-type", title, error.to_string())
-    })
+    header
+        .map_or(Ok(TelemetryFormat::Json), TelemetryFormat::of_type)
+        .map_err(|error| Problem::new(MEDIA_TYPE, error.to_string()))
 }
 
 #[derive(Debug, Deserialize, utoipa::IntoParams)]

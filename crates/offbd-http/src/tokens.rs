@@ -27,7 +27,8 @@ fn new_token(view: NewTokenView) -> Result<NewToken, Invalid> {
     request_body = NewTokenView,
     responses(
         (status = 201, body = MadeTokenView,
-            description = "Created; the secret cannot be retrieved later"),
+            description = "Created; the secret cannot be retrieved later",
+            headers(("Location"))),
         (status = 400, body = Problem),
         (status = 404, body = Problem, description = "No such asset"),
         (status = 409, body = Problem, description = "A token of this name is in force"),

@@ -23,6 +23,7 @@ use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
 use super::Problem;
 use super::body::{BodyShare, ReservedBytes};
+use offbd_wire::problem::UPGRADE_REQUIRED;
 
 /// Bytes that are read at once. After a message, as many of the next one may be in memory
 /// uncounted. Chosen: four messages of 100 samples in MessagePack.
@@ -54,7 +55,7 @@ impl<S: Send + Sync> FromRequestParts<S> for WebSocketRequest {
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let refused = |reason: &str| {
             let detail = format!("a WebSocket upgrade is required: {reason}");
-            Problem::new(StatusCode::UPGRADE_REQUIRED, "websocket", "Upgrade required", detail)
+            Problem::new(UPGRADE_REQUIRED, detail)
         };
         if parts.method != Method::GET {
             return Err(refused("the method is not GET"));

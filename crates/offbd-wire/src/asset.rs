@@ -22,6 +22,9 @@ use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AssetView {
+    /// Address of the JSON Schema of asset files, for editors; otherwise ignored.
+    #[serde(rename = "$schema", default, skip_serializing_if = "Option::is_none")]
+    pub schema: Option<String>,
     /// Name of the asset: 1 to 128 letters, digits, `-`, `_` or `.`.
     #[schema(pattern = "^[A-Za-z0-9._-]{1,128}$")]
     pub name: String,
@@ -716,6 +719,7 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
 #[must_use]
 pub fn view(rig: &Rig) -> AssetView {
     AssetView {
+        schema: None,
         name: rig.name.clone(),
         sample_rate_hz: rig.sample_rate_hz,
         ball: BallView {
@@ -853,6 +857,14 @@ mod tests {
     #[test]
     fn a_file_with_only_a_name_describes_the_chapters_rig() {
         assert_eq!(parse(br#"{"name":"a"}"#).unwrap(), Rig::chapter("a"));
+    }
+
+    #[test]
+    fn the_address_of_the_schema_is_accepted_and_not_kept() {
+        let rig = parse(br#"{"$schema":"asset.schema.json","name":"a"}"#).unwrap();
+        assert_eq!(rig, Rig::chapter("a"));
+        let error = parse(br#"{"$schema":5,"name":"a"}"#).unwrap_err();
+        assert_eq!(error.element, "/$schema");
     }
 
     #[test]

@@ -25,6 +25,7 @@ pub mod link;
 pub mod mapping;
 pub mod memory;
 pub mod notification;
+pub mod problem;
 pub mod provenance;
 pub mod recording;
 pub mod remark;
@@ -42,6 +43,3 @@ pub mod trend;
 pub mod trial;
 pub mod verdict;
 pub mod words;
-
-/// The start of the type of every problem (RFC 9457) of offbd; those of other servers differ.
-pub const PROBLEM_TYPE: &str = "urn:offbd:problem:";

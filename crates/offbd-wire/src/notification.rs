@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::alarm::CommunicationEventView;
-use super::service::EventView;
+use super::service::{ClearedEventView, FaultEventView};
 use super::words::{AlarmChangeWord, AlarmCodeWord, ChannelKind, DeliveryState, MailSecurity};
 
 /// Settings of a channel: exactly one of `webhook` and `email`.
@@ -284,7 +284,8 @@ pub struct NotificationDataView {
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[serde(untagged)]
 pub enum NotifiedEventView {
-    Fault(EventView),
+    Fault(FaultEventView),
+    Cleared(ClearedEventView),
     Communication(CommunicationEventView),
 }
 

@@ -16,6 +16,7 @@ use utoipa_axum::routes;
 use offbd_http::{ExtraRoutes, Problem, parse_json};
 use offbd_lab::simulation::{Fault, FaultEffect, PidGains};
 use offbd_service::access::Right;
+use offbd_wire::problem::{BUSY, INVALID};
 
 /// Capacity of the queue of commands; chosen. Further commands are refused.
 const MAX_WAITING: usize = 16;
@@ -182,9 +183,8 @@ async fn break_it(
     let request: FaultRequest = parse_json(&headers, &body)?;
     // The syntax requires a time, which is ignored: the fault begins now.
     let fault: Fault = format!("{}@0", request.fault).parse().map_err(|error| {
-        let (status, title) = (StatusCode::UNPROCESSABLE_ENTITY, "No such fault");
         let error: offbd_lab::simulation::FaultSyntax = error;
-        Problem::new(status, "invalid", title, error.to_string())
+        Problem::new(INVALID, error.to_string())
     })?;
     controls.send(VisitorCommand::Break(fault.effect))
 }
@@ -236,7 +236,7 @@ impl PageControls {
     fn send(&self, command: VisitorCommand) -> Result<StatusCode, Problem> {
         let full = |_| {
             let detail = "the demo has not executed the previous commands yet";
-            Problem::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
+            Problem::new(BUSY, detail)
         };
         self.commands.try_send(command).map(|()| StatusCode::ACCEPTED).map_err(full)
     }

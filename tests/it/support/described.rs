@@ -28,11 +28,7 @@ impl Described {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/asyncapi.yaml");
         let text = std::fs::read_to_string(path).unwrap();
         let document: Value = yaml_serde::from_str(&text).unwrap();
-        let mut definitions = Map::new();
-        for (name, schema) in document["components"]["schemas"].as_object().unwrap() {
-            definitions.insert(name.clone(), closed(schema, false));
-            definitions.insert(format!("{name}{PART}"), closed(schema, true));
-        }
+        let mut definitions = definitions(&document);
         let messages = document["components"]["messages"].as_object().unwrap();
         for (name, message) in messages {
             definitions.insert(format!("{name}+payload"), closed(&message["payload"], false));
@@ -85,9 +81,23 @@ impl Described {
     }
 }
 
+/// Returns the schemas of a document, each as the whole and as a part of an object.
+pub fn definitions(document: &Value) -> Map<String, Value> {
+    let schemas = document["components"]["schemas"].as_object().unwrap().iter();
+    let both = |(name, schema): (&String, &Value)| {
+        [(name.clone(), closed(schema, false)), (format!("{name}{PART}"), closed(schema, true))]
+    };
+    schemas.flat_map(both).collect()
+}
+
+/// Returns the object of a document that `value` is or refers to.
+pub fn resolved<'a>(value: &'a Value, document: &'a Value) -> &'a Value {
+    value["$ref"].as_str().map_or(value, |target| document.pointer(&target[1..]).unwrap())
+}
+
 /// Returns `schema` so that a field that it does not describe is an error, unless it `is_part`:
 /// then it describes some of the fields of an object, and others describe the rest.
-fn closed(schema: &Value, is_part: bool) -> Value {
+pub fn closed(schema: &Value, is_part: bool) -> Value {
     let Value::Object(keywords) = schema else { return schema.clone() };
     let is_object = ["properties", "allOf"].iter().any(|word| keywords.contains_key(*word));
     let mut result = Map::new();

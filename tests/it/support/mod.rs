@@ -11,6 +11,7 @@ pub mod calls;
 pub mod cluster;
 pub mod deletions;
 pub mod described;
+pub mod described_answers;
 pub mod device;
 pub mod held_socket;
 pub mod history;
@@ -284,10 +285,15 @@ impl Client {
         }
     }
 
+    /// Sends a request; the response must be as described.
     pub async fn send(&self, request: reqwest::RequestBuilder) -> Answer {
-        let response = request.send().await.unwrap();
+        let request = request.build().unwrap();
+        let (method, path) = (request.method().clone(), request.url().path().to_owned());
+        let response = self.http.execute(request).await.unwrap();
         let (status, headers) = (response.status(), response.headers().clone());
-        Answer { status, headers, text: response.text().await.unwrap() }
+        let answer = Answer { status, headers, text: response.text().await.unwrap() };
+        described_answers::check(&method, &path, &answer);
+        answer
     }
 
     pub async fn get(&self, path: &str) -> Answer {

@@ -2,11 +2,11 @@
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
 use serde_json::Value;
 
 use super::{AssetItemPath, AssetPath, BASE, Problem, Query, SchemaQuery, answer};
 use offbd_service::Service;
+use offbd_wire::problem::UNKNOWN_DATA;
 use offbd_wire::sovd::{SovdDataView, SovdReferenceView, SovdReferencesView, SovdValueView};
 
 /// Id, name and category of each value.
@@ -54,8 +54,7 @@ pub(super) async fn get(
         _ => {
             service.check_known(&asset).await?;
             let detail = format!("there is no value `{id}`; there are state and description");
-            let title = "No such value";
-            return Err(Problem::new(StatusCode::NOT_FOUND, "unknown-data", title, detail));
+            return Err(Problem::new(UNKNOWN_DATA, detail));
         }
     };
     Ok(answer(&SovdDataView { id, data, errors: Vec::new() }, "SovdData", &query))

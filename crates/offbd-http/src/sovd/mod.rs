@@ -9,7 +9,6 @@ mod data;
 mod entities;
 mod faults;
 mod recordings;
-mod schema;
 
 use axum::Json;
 use serde::{Deserialize, Serialize};
@@ -18,7 +17,7 @@ use utoipa::openapi::OpenApi as Document;
 use utoipa_axum::routes;
 
 use super::routes::GuardedRouter;
-use super::{AssetItemPath, AssetPath, Problem, Query};
+use super::{AssetItemPath, AssetPath, Problem, Query, json_schema};
 use offbd_service::access::Right;
 
 /// Path below which the entities are.
@@ -55,7 +54,7 @@ pub(super) fn routes() -> GuardedRouter {
 fn answer(view: &impl Serialize, name: &str, query: &SchemaQuery) -> Json<Value> {
     let mut json = serde_json::to_value(view).unwrap_or_default();
     if query.include_schema {
-        json["schema"] = schema::of(name);
+        json["schema"] = json_schema::of(name);
     }
     Json(json)
 }

@@ -79,7 +79,7 @@ pub(super) async fn list(
             (offbd_wire::telemetry::RowsView = "application/json"),
             (BinaryFile = "application/vnd.apache.parquet"),
             (BinaryFile = "application/vnd.apache.arrow.stream"),
-            (BinaryFile = "application/vnd.mcap"))),
+            (BinaryFile = "application/vnd.mcap")), headers(("Content-Disposition"))),
         (status = 404, body = Problem), (status = 406, body = Problem)))]
 pub(super) async fn get(
     State(service): State<Service>,

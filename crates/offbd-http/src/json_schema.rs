@@ -1,4 +1,4 @@
-//! The JSON schemas of answers, taken from the description of the interface.
+//! JSON schemas of single types, taken from the description of the interface.
 
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
