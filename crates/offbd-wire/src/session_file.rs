@@ -39,6 +39,7 @@ use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use offbd_core::vocabulary::Sample;
+use serde::{Deserialize, Serialize};
 
 use super::session_csv;
 use super::table::{CsvError, RowError, TableOptions, TableReader};
@@ -271,7 +272,7 @@ pub fn is_guarded() -> bool {
 }
 
 /// Where in a file a row is, counted from 1; lines count the header.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RowPlace {
     Line(u64),
     Row(u64),
@@ -287,7 +288,7 @@ impl fmt::Display for RowPlace {
 }
 
 /// A row of a recording that is rejected.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RejectedRow {
     pub place: RowPlace,
     pub reason: String,
