@@ -23,7 +23,7 @@ use offbd_wire::table::{RATES_HZ, TableOptions};
 
 /// A recording: a file, or a table in batches.
 pub(crate) enum Recording {
-    File(SessionFile),
+    File(Box<SessionFile>),
     Stream(RecordBatchStreamReader),
     Whole(Box<SampleColumns>),
 }
@@ -84,7 +84,7 @@ impl Recording {
     pub(crate) fn of(source: &Bound<'_, PyAny>, options: &TableOptions) -> PyResult<Self> {
         if source.is_instance_of::<PyString>() || source.hasattr("__fspath__")? {
             let file = SessionFile { path: source.extract()?, options: options.clone() };
-            return Ok(Self::File(file));
+            return Ok(Self::File(Box::new(file)));
         }
         if source.hasattr("__arrow_c_stream__")? {
             return Ok(Self::Stream(stream(source)?));
@@ -126,7 +126,10 @@ impl Recording {
             }
             Self::File(file) => {
                 return file.for_each(|n_run, place, row| match n_run {
-                    1 => Ok(take(place, row)),
+                    1 => {
+                        take(place, row);
+                        Ok(())
+                    }
                     _ => Err(RecordingError::SeveralRuns { path: file.path.clone(), place }),
                 });
             }
@@ -156,7 +159,8 @@ impl Recording {
 
     /// The name of the session: that of the file, or else `session`.
     pub(crate) fn name(&self) -> String {
-        let Self::File(SessionFile { path, .. }) = self else { return "session".to_owned() };
+        let Self::File(file) = self else { return "session".to_owned() };
+        let path = &file.path;
         path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
     }
 }
@@ -250,7 +254,7 @@ pub(crate) fn read(
 ) -> PyResult<Vec<Table>> {
     let rig = rig(asset_file).map_err(unusable)?;
     let options = options(columns, rate_hz)?.of_rig(rig.columns.as_deref());
-    let runs = py.detach(|| Recording::File(SessionFile { path, options }).runs())?;
+    let runs = py.detach(|| Recording::File(Box::new(SessionFile { path, options })).runs())?;
     runs.warn(py)?;
     let with_seq = |run: &[Sample]| run.iter().any(|sample| sample.seq.is_some());
     let tables = runs.samples.iter().map(|run| Table::of_samples(run, with_seq(run)));
