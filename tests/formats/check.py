@@ -177,6 +177,51 @@ for name in ["trace", "served"]:
     assert json.loads(metadata[b"offbd.thresholds"]) == document["thresholds"], metadata
     assert metadata[b"offbd.verdict_hash"].decode() == expected_hash, metadata
 
+# Tables of a clock that counts from 1970 have absolute times too, whose statistics each program
+# reads; those of the other columns are of an order that pyarrow does not know.
+SINCE_1970_S = 1_764_000_000.125
+dated = csv.assign(t_s=csv.t_s + SINCE_1970_S)
+dated.to_csv(DATA / "dated.csv", index=False)
+dated_hash = verdict_hash("dated.csv")
+with service() as api:
+    asset = json.loads((DATA / "learnt.json").read_text()) | {"name": "dated"}
+    session = api.imported(asset, (DATA / "dated.csv").read_bytes())
+    opened_at = json.loads(api.get(f"/sessions/{session}", "application/json"))["opened_at"]
+    for path, name in [("telemetry", "served"), ("trace", "served-trace")]:
+        for kind, suffix in [("parquet", "parquet"), ("arrow.stream", "arrow")]:
+            file = api.get(f"/sessions/{session}/{path}", f"application/vnd.apache.{kind}")
+            (DATA / f"{name}-dated.{suffix}").write_bytes(file)
+offbd("export", "dated.csv", "-o", "dated.parquet")
+offbd("export", "dated.csv", "-o", "dated.arrow")
+offbd("export", "dated.csv", "--asset", "learnt.json", "--trace", "dated-trace.parquet")
+for name in ["served-dated", "served-trace-dated", "dated", "dated-trace"]:
+    parquet, arrow = DATA / f"{name}.parquet", DATA / f"{name}.arrow"
+    tables = {"Parquet": pyarrow.parquet.read_table(parquet)}
+    if arrow.exists():
+        tables["Arrow"] = pyarrow.ipc.open_stream(arrow.read_bytes()).read_all()
+    for what, found in tables.items():
+        assert str(found.schema.field("time").type) == "timestamp[us, tz=UTC]", found.schema
+        micros = [round(t_s * 1e6) for t_s in found["t_s"].to_pylist()]
+        check(f"{name}: times in {what}", found["time"].cast("int64").to_pylist(), micros)
+        opened = opened_at.encode() if name.startswith("served") else None
+        assert found.schema.metadata.get(b"offbd.opened_at") == opened, found.schema.metadata
+    first, last = min(micros), max(micros)
+    column = next(c for c in (lambda m: map(m.column, range(m.num_columns)))(
+        pyarrow.parquet.read_metadata(parquet).row_group(0)) if c.path_in_schema == "time")
+    bounds = [round(t.timestamp() * 1e6) for t in (column.statistics.min, column.statistics.max)]
+    check(f"{name}: statistics of `time` in pyarrow", bounds, [first, last])
+    (bounds,) = duckdb.sql(f"""SELECT stats_min_value::DOUBLE, stats_max_value::DOUBLE
+        FROM parquet_metadata('{parquet}') WHERE path_in_schema = 't_s'""").fetchall()
+    t_s = tables["Parquet"]["t_s"].to_pylist()
+    check(f"{name}: statistics of `t_s` in DuckDB", bounds, (min(t_s), max(t_s)))
+for name in ["dated.parquet", "dated.arrow", "served-dated.parquet", "served-dated.arrow"]:
+    check(name, verdict_hash(name), dated_hash)
+offbd("export", "dated.csv", "-o", "dated.mcap")
+with open(DATA / "dated.mcap", "rb") as file:
+    times = [message.log_time for _, _, message in mcap.reader.make_reader(file).iter_messages()]
+check("times in MCAP", times, [round(t_s * 1e9) for t_s in dated.t_s])
+assert "time" not in table.schema.names, "a clock that does not count from 1970"
+
 # An MCAP file has the samples. Messages in JSON are as their schemas say; those of Foxglove are
 # read with its own types and, like any program does, with those that the file describes.
 FOXGLOVE = {f"foxglove.{kind.DESCRIPTOR.name}": kind for kind in (FrameTransforms, Log, SceneUpdate)}

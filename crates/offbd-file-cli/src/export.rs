@@ -104,6 +104,7 @@ fn export_session(args: &SessionExport, table: &TableOptions) -> anyhow::Result<
     let columns = setup.as_ref().and_then(|setup| setup.rig.columns.as_deref());
     let table = &table.clone().of_rig(columns);
     let info = info(args, table, setup.as_ref())?;
+    let info = SessionInfo { first_t_s: first_t_s((&args.session, table))?, ..info };
     if let (Some(output), Some(format)) = (output, format) {
         write_session((&args.session, table), format, &info, output)?;
     }
@@ -167,7 +168,14 @@ fn info(
         asset_file: Some(serde_json::to_string(&asset::view(&setup.rig))?),
         calibration_id: setup.rig.calibration.as_deref().map(asset::calibration_id),
         verdict_hash: Some(judged.summary.verdict_hash.clone()),
+        ..SessionInfo::default()
     })
+}
+
+/// The time of the first valid row, s.
+fn first_t_s((path, table): (&Path, &TableOptions)) -> Result<Option<f64>, InputError> {
+    let mut samples = judge::open(path, table)?.filter_map(Result::ok);
+    Ok(samples.next().map(|sample| sample.t_s))
 }
 
 fn has_seq((path, table): (&Path, &TableOptions)) -> Result<bool, InputError> {

@@ -1,4 +1,4 @@
-//! Recordings that come from Python: anything with the Arrow PyCapsule interface (tables of
+//! Tables that come from Python: anything with the Arrow PyCapsule interface (tables of
 //! pandas, polars, pyarrow, DuckDB), or a dictionary of columns (NumPy arrays, lists).
 //!
 //! The columns are those of a session file: `t_s`, `cmd_qx_rad`, `cmd_qy_rad`, `x_m`, `y_m`
@@ -26,12 +26,6 @@ use pyo3::types::{PyCapsule, PyMapping};
 use crate::table::STREAM;
 use offbd_core::vocabulary::Sample;
 use offbd_wire::session_csv::COLUMNS;
-
-/// A recording in batches.
-pub(crate) enum Recording {
-    Stream(RecordBatchStreamReader),
-    Whole(Box<SampleColumns>),
-}
 
 /// Why the columns of a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -61,48 +55,9 @@ pub(crate) struct SampleColumns {
     numbers: [Float64Array; COLUMNS.len()],
 }
 
-impl Recording {
-    /// Takes a recording from Python.
-    pub(crate) fn of(source: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if source.hasattr("__arrow_c_stream__")? {
-            return Ok(Self::Stream(stream(source)?));
-        }
-        if source.hasattr("__arrow_c_array__")? {
-            return Ok(Self::Whole(Box::new(SampleColumns::of_batch(&record_batch(source)?)?)));
-        }
-        if let Ok(columns) = source.cast::<PyMapping>() {
-            return Ok(Self::Whole(Box::new(SampleColumns::of_mapping(columns)?)));
-        }
-        Err(PyTypeError::new_err(format!(
-            "a recording is a table with `__arrow_c_stream__` or `__arrow_c_array__`, or a \
-             mapping from names to columns, not {}",
-            source.get_type().name()?
-        )))
-    }
-
-    /// Calls `take` with each sample, in the order of the rows.
-    pub(crate) fn for_each(self, mut take: impl FnMut(Sample)) -> Result<(), ColumnError> {
-        match self {
-            Self::Whole(columns) => columns.for_each(&mut take),
-            Self::Stream(batches) => {
-                for batch in batches {
-                    SampleColumns::of_batch(&batch?)?.for_each(&mut take);
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns all samples.
-    pub(crate) fn samples(self) -> Result<Vec<Sample>, ColumnError> {
-        let mut samples = Vec::new();
-        self.for_each(|sample| samples.push(sample))?;
-        Ok(samples)
-    }
-}
-
 impl SampleColumns {
-    fn of_batch(batch: &RecordBatch) -> Result<Self, ColumnError> {
+    /// Takes the columns of a record batch.
+    pub(crate) fn of_batch(batch: &RecordBatch) -> Result<Self, ColumnError> {
         let column = |name: &'static str| match batch.column_by_name(name) {
             Some(column) => floats(name, column),
             None => Err(ColumnError::Missing(name)),
@@ -112,7 +67,8 @@ impl SampleColumns {
         Ok(Self { seq, numbers: [column(t)?, column(qx)?, column(qy)?, column(x)?, column(y)?] })
     }
 
-    fn of_mapping(columns: &Bound<'_, PyMapping>) -> PyResult<Self> {
+    /// Takes the columns of a mapping from their names.
+    pub(crate) fn of_mapping(columns: &Bound<'_, PyMapping>) -> PyResult<Self> {
         let column = |name: &'static str| match columns.contains(name)? {
             true => python_floats(name, &columns.get_item(name)?),
             false => Err(ColumnError::Missing(name).into()),
@@ -131,7 +87,8 @@ impl SampleColumns {
         Ok(Self { seq, numbers })
     }
 
-    fn for_each(&self, take: &mut impl FnMut(Sample)) {
+    /// Calls `take` with each sample, in the order of the rows.
+    pub(crate) fn for_each(&self, take: &mut impl FnMut(Sample)) {
         let [t_s, qx, qy, x, y] = &self.numbers;
         for row in 0..t_s.len() {
             take(Sample {
@@ -226,7 +183,7 @@ fn python_floats(name: &'static str, column: &Bound<'_, PyAny>) -> PyResult<Floa
 }
 
 /// Takes the stream of record batches that `source` offers.
-fn stream(source: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> {
+pub(crate) fn stream(source: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> {
     let capsule = source.call_method0("__arrow_c_stream__")?;
     let stream = pointer::<FFI_ArrowArrayStream>(&capsule, STREAM)?;
     // SAFETY: a capsule of this name holds an initialised stream, which is moved out of it.
@@ -235,7 +192,7 @@ fn stream(source: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> {
 }
 
 /// Takes the record batch that `source` offers.
-fn record_batch(source: &Bound<'_, PyAny>) -> PyResult<RecordBatch> {
+pub(crate) fn record_batch(source: &Bound<'_, PyAny>) -> PyResult<RecordBatch> {
     let capsules = source.call_method0("__arrow_c_array__")?;
     let schema = pointer::<FFI_ArrowSchema>(&capsules.get_item(0)?, c"arrow_schema")?;
     let array = pointer::<FFI_ArrowArray>(&capsules.get_item(1)?, c"arrow_array")?;

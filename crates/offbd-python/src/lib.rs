@@ -8,6 +8,7 @@
 mod columns;
 mod judge;
 mod lab;
+mod recording;
 mod table;
 
 use pyo3::exceptions::PyValueError;
@@ -23,6 +24,8 @@ mod _offbd {
     use super::judge::{NativeEngine, calibrate, replay};
     #[pymodule_export]
     use super::lab::{scene, simulate};
+    #[pymodule_export]
+    use super::recording::read;
     #[pymodule_export]
     use super::table::Table;
 

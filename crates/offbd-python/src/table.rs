@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, UInt64Array};
+use arrow_ipc::reader::StreamReader;
+use arrow_ipc::writer::StreamWriter;
 use arrow_schema::ArrowError;
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyType};
 
 use crate::unusable;
 use offbd_core::vocabulary::Sample;
@@ -52,6 +54,25 @@ pub(crate) fn numbers(values: impl IntoIterator<Item = Option<f64>>) -> ArrayRef
 
 #[pymethods]
 impl Table {
+    /// The table in the bytes of an Arrow stream, as [`__reduce__`](Self::__reduce__) writes it.
+    #[new]
+    fn of_ipc(bytes: &[u8]) -> PyResult<Self> {
+        let mut batches = StreamReader::try_new(bytes, None).map_err(unusable)?;
+        let batch = batches.next().ok_or_else(|| unusable("the Arrow stream has no rows"))?;
+        Ok(Self { batch: batch.map_err(unusable)? })
+    }
+
+    /// How the table is pickled.
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyType>, (Bound<'py, PyBytes>,))> {
+        let batch = &slf.get().batch;
+        let mut writer = StreamWriter::try_new(Vec::new(), batch.schema_ref()).map_err(unusable)?;
+        writer.write(batch).map_err(unusable)?;
+        let bytes = writer.into_inner().map_err(unusable)?;
+        Ok((slf.get_type(), (PyBytes::new(slf.py(), &bytes),)))
+    }
+
     #[getter]
     fn column_names(&self) -> Vec<String> {
         self.batch.schema_ref().fields().iter().map(|field| field.name().clone()).collect()

@@ -115,7 +115,7 @@ class Peer:
         assert self.service is not None
         host, port = self.service.listen.rsplit(":", 1)
         with socket.create_connection((host, int(port))) as upstream:
-            upstream.sendall(request)
+            upstream.sendall(as_last(request))
             return read_all(upstream)
 
     def close(self) -> None:
@@ -150,6 +150,12 @@ def read_request(connection: socket.socket) -> bytes:
     while len(body) < length:
         body += received(connection)
     return head + b"\r\n\r\n" + body
+
+
+def as_last(request: bytes) -> bytes:
+    """The request, with which the client asks for the end of the connection."""
+    line, _, rest = request.partition(b"\r\n")
+    return line + b"\r\nConnection: close\r\n" + rest
 
 
 def received(connection: socket.socket) -> bytes:

@@ -7,11 +7,12 @@ import random
 import socket
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from conftest import Peer, Service, answered, problem, read_all, read_request
+from conftest import Peer, Service, answered, as_last, problem, read_all, read_request
 
 import offbd
 
@@ -49,7 +50,7 @@ class LossyProxy:
             # A client that has given up, or a service that is just being killed.
             try:
                 with socket.create_connection((host, int(port))) as upstream:
-                    upstream.sendall(read_request(connection))
+                    upstream.sendall(as_last(read_request(connection)))
                     answer = read_all(upstream)
             except OSError:
                 return
@@ -60,6 +61,70 @@ class LossyProxy:
                 connection.sendall(answer)
             except OSError:
                 pass
+
+
+class Relay:
+    """Passes connections on as they are, counts them, and notes who ends them."""
+
+    def __init__(self, service: Service) -> None:
+        self.service = service
+        self.n_connections = 0
+        self.ended: list[str] = []
+        self.open: list[socket.socket] = []
+        self.threads: list[threading.Thread] = []
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self.accept, daemon=True).start()
+
+    def __enter__(self) -> Relay:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.listener.close()
+        self.cut()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
+
+    def accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self.listener.accept()
+            except OSError:
+                return
+            self.n_connections += 1
+            host, port = self.service.listen.rsplit(":", 1)
+            upstream = socket.create_connection((host, int(port)))
+            self.open += [connection, upstream]
+            for ends in (("client", connection, upstream), ("service", upstream, connection)):
+                self.threads.append(threading.Thread(target=self.copy, args=ends))
+                self.threads[-1].start()
+
+    def copy(self, name: str, source: socket.socket, to: socket.socket) -> None:
+        try:
+            while part := source.recv(65536):
+                to.sendall(part)
+            self.ended.append(name)
+            to.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass  # cut, or closed by the other end
+
+    def cut(self) -> None:
+        """Ends the connections that are open."""
+        for end in self.open:
+            try:
+                end.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass  # closed by its peer
+        self.wait_for_end()
+
+    def wait_for_end(self) -> None:
+        """Returns when both ends of each connection have closed it."""
+        for thread in self.threads:
+            thread.join()
+        for end in self.open:
+            end.close()
+        self.threads, self.open = [], []
 
 
 @pytest.fixture
@@ -92,9 +157,10 @@ def test_nothing_is_lost_or_doubled_by_a_lossy_line_and_a_kill(
     assert client.recording(second.session_id) == samples
     wanted = offbd.replay(simulation.table, asset)
     assert wanted.confirmed == ["x_servo"]
-    assert ended["verdict"]["verdict_hash"] == wanted.hash
+    assert ended.get("verdict") == {**wanted.summary, "session": "s"}
     again = client.replay(second.session_id)
-    assert again["result"]["summary"]["verdict_hash"] == wanted.hash
+    result = again.get("result")
+    assert result is not None and result["summary"]["verdict_hash"] == wanted.hash
     assert [fault["code"] for fault in client.faults("rig", status="confirmed")] == wanted.confirmed
     # The proxy passes only whole answers on, and this one never ends.
     events = offbd.Client(service.url).events("rig", after=0)
@@ -153,34 +219,141 @@ def test_a_service_that_cannot_be_reached_is_an_error_after_the_patience() -> No
 HTML = "<html><h1>Log in</h1></html>"
 
 
+def send_one(url: str, patience_s: float | None = 60.0) -> offbd.Acknowledgement:
+    with offbd.Client(url, patience_s=patience_s) as client:
+        return client.send("rig", [{"seq": 1, "t_s": 0.0}], session="s")
+
+
 @pytest.mark.parametrize(
     ("answer", "told", "status"),
     [
-        (answered("200 OK", HTML), "200 OK, but not an answer of offbd: <html><h1>Log in", None),
-        (answered("200 OK", "{}"), "200 OK, but not an answer of offbd: {}", None),
-        (answered("200 OK", ""), "200 OK, but not an answer of offbd", None),
         (answered("200 OK", '{"accepted": 1}', cut=4), "IncompleteRead", None),
-        (answered("501 Not Implemented", HTML), "501 Not Implemented: <html><h1>Log in", 501),
+        (b"", "Remote end closed", None),
+        (answered("503 Service Unavailable", HTML), "503 Service Unavailable: <html>", 503),
         (problem("429 Too Many Requests", "busy"), "429 Too Many Requests: busy", 429),
     ],
 )
-def test_what_a_peer_answers_that_has_not_stored_the_samples_is_told(
+def test_a_failure_that_may_pass_is_logged_and_the_samples_are_sent_again(
     peer: Peer, caplog: pytest.LogCaptureFixture, answer: bytes, told: str, status: int | None
 ) -> None:
-    offbd.Client(peer.service.url).put_asset("rig", {})  # type: ignore[union-attr]
-    samples = [{"seq": 1, "t_s": 0.0}]
+    offbd.Client(peer.url).put_asset("rig", {})
     peer.answers = [answer]
     with pytest.raises(offbd.ClientError) as failure:
-        offbd.Client(peer.url, patience_s=0.0).send("rig", samples, session="s")
+        send_one(peer.url, patience_s=0.0)
     assert told in str(failure.value) and peer.url in str(failure.value)
     assert (failure.value.status, failure.value.is_final) == (status, False)
     assert caplog.records == []
-    # With patience it is logged, and the samples are sent again.
     peer.answers = [answer]
-    assert offbd.Client(peer.url).send("rig", samples, session="s").accepted == 1
+    assert send_one(peer.url).accepted == 1
     assert [(r.name, r.levelname, told in r.getMessage()) for r in caplog.records] == [
         ("offbd", "WARNING", True)
     ]
+
+
+@pytest.mark.parametrize(
+    ("answer", "told", "status"),
+    [
+        (answered("200 OK", HTML), "200 OK, but not an answer of offbd: <html><h1>Log in", 200),
+        (answered("200 OK", "{}"), "200 OK, but not an answer of offbd: {}", 200),
+        (answered("200 OK", ""), "200 OK, but not an answer of offbd", 200),
+        (answered("501 Not Implemented", HTML), "501 Not Implemented: <html><h1>Log in", 501),
+        (answered("505 HTTP Version Not Supported", HTML), "505 HTTP Version Not", 505),
+        (answered("302 Found", HTML), "302 Found: <html>", 302),
+        (b"nonsense\r\n\r\n", "nonsense", None),
+    ],
+)
+def test_an_answer_that_would_come_again_ends_the_attempts(
+    peer: Peer, caplog: pytest.LogCaptureFixture, answer: bytes, told: str, status: int | None
+) -> None:
+    offbd.Client(peer.url).put_asset("rig", {})
+    peer.answers = [answer]
+    with pytest.raises(offbd.ClientError) as failure:
+        send_one(peer.url, patience_s=None)
+    assert told in str(failure.value) and peer.url in str(failure.value)
+    assert (failure.value.status, failure.value.is_final) == (status, False)
+    assert caplog.records == []
+
+
+def test_requests_share_a_connection_until_the_client_is_closed(
+    service: Service, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A peer that passes everything on, byte by byte, counts the connections."""
+    with Relay(service) as relay:
+        with offbd.Client(relay.url) as client:
+            client.put_asset("rig", {})
+            for _ in range(5):
+                client.send("rig", [{"seq": 1, "t_s": 0.0}])
+            with pytest.raises(offbd.ClientError, match="404"):
+                client.asset("none")
+            assert client.state("rig")["asset"] == "rig"
+            assert relay.n_connections == 1
+            # The service, or a proxy, closes a connection that has been idle.
+            relay.cut()
+            assert len(client.assets()) == 1
+            assert relay.n_connections == 2 and caplog.records == []
+            relay.ended.clear()
+        relay.wait_for_end()
+        assert relay.ended[0] == "client"
+        assert len(client.assets()) == 1, "a closed client opens a connection again"
+        assert relay.n_connections == 3
+        client.close()
+
+
+def test_threads_may_share_a_client(service: Service) -> None:
+    with offbd.Client(service.url) as client:
+        client.put_asset("rig", {})
+        seqs = range(200)
+
+        def send(seq: int) -> int:
+            return client.send("rig", [{"seq": seq, "t_s": seq / 100}], session="s").accepted
+
+        with ThreadPoolExecutor(4) as pool:
+            assert sum(pool.map(send, seqs)) == len(seqs)
+        (session,) = client.sessions("rig")
+        assert sorted(s.get("seq", -1) or 0 for s in client.recording(session["id"])) == list(seqs)
+
+
+def test_a_proxy_of_the_environment_is_used(
+    service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        monkeypatch.setenv("http_proxy", f"http://a:b%40@127.0.0.1:{listener.getsockname()[1]}")
+        client = offbd.Client("http://offbd.example:81", patience_s=0.0)
+        asking = threading.Thread(target=lambda: client.assets())
+        asking.start()
+        connection, _ = listener.accept()
+        with connection:
+            head, _, _ = read_request(connection).partition(b"\r\n\r\n")
+            page = answered("200 OK", '{"items": []}', "application/json")
+            connection.sendall(page)
+        asking.join()
+        client.close()
+    lines = head.split(b"\r\n")
+    assert lines[0] == b"GET http://offbd.example:81/api/v1/assets HTTP/1.1"
+    assert b"Host: offbd.example:81" in lines
+    assert b"Proxy-Authorization: Basic YTpiQA==" in lines
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+    with offbd.Client(service.url) as direct:
+        assert direct.assets() == []
+
+
+def test_a_rig_is_calibrated_from_its_sessions(service: Service, folder: Path) -> None:
+    with offbd.Client(service.url) as client:
+        client.put_asset("rig", json.loads((folder / "rig.json").read_text()))
+        imported = client.import_session("rig", (folder / "healthy.csv").read_bytes())
+        job = client.calibrate("rig", [imported["session"]["id"]], "Ada")
+        wanted = json.loads((folder / "learnt.json").read_text())["calibration"]
+        learnt = job.get("calibration")
+        assert learnt is not None and learnt["x"] == wanted["x"]
+        assert not job["active"]
+        assert client.activate_calibration("rig", job["id"], "Ada")["active"]
+        assert client.learning("rig")["state"]
+        with pytest.raises(offbd.ClientError, match="409"):
+            client.accept_learning("rig", "Ada")
+        ended = client.send("rig", [{"seq": 1, "t_s": 0.0}], session="s").session_id
+        assert ended is not None
+        with pytest.raises(offbd.ClientError, match="failed: .*"):
+            client.calibrate("rig", [client.end_session(ended)["id"]])
 
 
 def test_the_patience_is_bounded_unless_the_caller_says_otherwise(

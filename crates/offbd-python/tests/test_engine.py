@@ -7,7 +7,7 @@ import json
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,9 @@ import pytest
 from conftest import judged_by_program, run_program
 
 import offbd
+
+if TYPE_CHECKING:
+    from offbd.documents import Profile
 
 COLUMNS = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"]
 EMPTY: dict[str, list[float]] = {name: [] for name in COLUMNS}
@@ -31,6 +34,10 @@ def lists(path: Path) -> dict[str, list[float | None]]:
 
 def arrays(path: Path) -> dict[str, Any]:
     return {name: np.array(column, dtype=float) for name, column in lists(path).items()}
+
+
+def any_word(word: str) -> Any:
+    return word
 
 
 class OneBatch:
@@ -59,7 +66,7 @@ SOURCES: dict[str, Callable[[Path], Any]] = {
 @pytest.mark.parametrize("source", SOURCES)
 @pytest.mark.parametrize("profile", [None, "textbook"])
 def test_validate_the_verdict_against_the_program(
-    folder: Path, source: str, profile: str | None
+    folder: Path, source: str, profile: Profile | None
 ) -> None:
     session = folder / "sick.csv"
     more = ("--profile", profile) if profile else ()
@@ -128,11 +135,14 @@ def test_validate_the_simulation_against_the_program(folder: Path) -> None:
     assert drawn.table.to_pydict() == lists(folder / "7.csv")
 
 
+def without_date(learnt: Any) -> Any:
+    return {**learnt, "calibration": {**learnt["calibration"], "made_at": None}}
+
+
 def test_validate_the_calibration_against_the_program(folder: Path) -> None:
     learnt = offbd.calibrate(folder / "rig.json", [pd.read_csv(folder / "healthy.csv")])
     wanted = json.loads((folder / "learnt.json").read_text())
-    learnt["calibration"]["made_at"] = wanted["calibration"]["made_at"]
-    assert learnt == wanted
+    assert without_date(learnt) == without_date(wanted)
 
 
 def test_validate_a_scene_against_the_program(folder: Path) -> None:
@@ -209,9 +219,9 @@ def test_other_threads_run_meanwhile(folder: Path) -> None:
             "`x_m` has 2 dimensions",
         ),
         (lambda: offbd.replay(EMPTY, '{"name":"a","bal":{}}'), "/bal"),
-        (lambda: offbd.replay(EMPTY, profile="best"), "best"),
+        (lambda: offbd.replay(EMPTY, profile=any_word("best")), "best"),
         (lambda: offbd.calibrate({"name": "a"}, [EMPTY]), "no sample has a position"),
-        (lambda: offbd.simulate(preset="none"), "none"),
+        (lambda: offbd.simulate(preset=any_word("none")), "none"),
         (lambda: offbd.simulate(faults=["x_servo"]), "x_servo"),
         (lambda: offbd.simulate(seconds=float("nan")), "/seconds"),
         (lambda: offbd.scene("{}", sample_s=0.0), "/sample_s"),

@@ -61,6 +61,8 @@ pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
 pub(super) fn session_info(row: &SessionRow) -> Result<SessionInfo, ServiceError> {
     Ok(SessionInfo {
         session: row.name.clone(),
+        opened_at: Some(rfc3339(row.opened_at)),
+        first_t_s: row.progress.first_t_s,
         asset_file: Some(row.setup.clone()),
         calibration_id: rig(&row.setup)?.calibration.as_deref().map(asset::calibration_id),
         verdict_hash: row.verdict_hash.clone(),

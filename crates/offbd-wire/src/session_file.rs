@@ -39,6 +39,7 @@ use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom};
 
 use offbd_core::vocabulary::Sample;
+use serde::{Deserialize, Serialize};
 
 use super::session_csv;
 use super::table::{CsvError, RowError, TableOptions, TableReader};
@@ -271,7 +272,7 @@ pub fn is_guarded() -> bool {
 }
 
 /// Where in a file a row is, counted from 1; lines count the header.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum RowPlace {
     Line(u64),
     Row(u64),
@@ -287,7 +288,7 @@ impl fmt::Display for RowPlace {
 }
 
 /// A row of a recording that is rejected.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RejectedRow {
     pub place: RowPlace,
     pub reason: String,
@@ -437,11 +438,28 @@ impl SessionRows for TextRows<'_> {
     }
 }
 
+/// Times of a device's clock, s, that are seconds since 1970: from 2000 to 2100. A clock that counts
+/// from the start of the device would have to run for 30 years.
+#[cfg(feature = "parquet")]
+const UNIX_TIMES_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
+
+/// Returns the absolute time of `t_s` on the device's clock, µs since 1970; `None` if that does not
+/// count from 1970.
+#[cfg(feature = "parquet")]
+fn unix_micros(t_s: f64) -> Option<i64> {
+    UNIX_TIMES_S.contains(&t_s).then(|| (t_s * 1e6).round() as i64)
+}
+
 /// What a file says about its session, beside the samples.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SessionInfo {
     /// The session's name.
     pub session: String,
+    /// The time at which the service opened the session, RFC 3339.
+    pub opened_at: Option<String>,
+    /// Time of a sample, s on the device's clock. If it is a time since 1970, the tables have a
+    /// column with the absolute time.
+    pub first_t_s: Option<f64>,
     /// The asset file that the session is judged with.
     pub asset_file: Option<String>,
     pub calibration_id: Option<String>,
@@ -456,6 +474,7 @@ impl SessionInfo {
         let entries = [
             ("offbd.session", Some(self.session.as_str())),
             ("offbd.version", Some(env!("CARGO_PKG_VERSION"))),
+            ("offbd.opened_at", self.opened_at.as_deref()),
             ("offbd.asset_file", self.asset_file.as_deref()),
             ("offbd.calibration_id", self.calibration_id.as_deref()),
             ("offbd.verdict_hash", self.verdict_hash.as_deref()),

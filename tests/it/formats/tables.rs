@@ -48,7 +48,8 @@ fn a_format_that_is_not_built_is_refused_with_the_feature_that_it_needs() {
 #[cfg(feature = "parquet")]
 mod columns {
     use super::*;
-    use arrow_array::types::{Float32Type, Int32Type, UInt8Type};
+    use arrow_array::cast::AsArray;
+    use arrow_array::types::{Float32Type, Int32Type, TimestampMicrosecondType, UInt8Type};
     use arrow_array::{
         ArrayRef, BooleanArray, Float64Array, NullArray, PrimitiveArray, RecordBatch,
     };
@@ -63,13 +64,54 @@ mod columns {
     };
 
     fn write(format: SessionFormat, samples: &[Sample], at_a_time: usize) -> Vec<u8> {
-        let (mut writer, mut file) =
-            SessionWriter::new(format, &SessionInfo::default(), true).unwrap();
+        write_with(&SessionInfo::default(), format, samples, at_a_time)
+    }
+
+    fn write_with(
+        info: &SessionInfo,
+        format: SessionFormat,
+        samples: &[Sample],
+        at_a_time: usize,
+    ) -> Vec<u8> {
+        let (mut writer, mut file) = SessionWriter::new(format, info, true).unwrap();
         for samples in samples.chunks(at_a_time) {
             file.extend(writer.rows(samples).unwrap());
         }
         file.extend(writer.end().unwrap());
         file
+    }
+
+    /// The absolute times in an Arrow stream, µs since 1970, and their type; `None` without them.
+    fn times(file: Vec<u8>) -> Option<(Vec<Option<i64>>, String)> {
+        let batches = arrow_ipc::reader::StreamReader::try_new(Cursor::new(file), None).unwrap();
+        let data_type = batches.schema().field_with_name("time").ok()?.data_type().to_string();
+        let mut times = Vec::new();
+        for batch in batches {
+            let column = batch.unwrap().column_by_name("time").unwrap().clone();
+            times.extend(column.as_primitive::<TimestampMicrosecondType>());
+        }
+        Some((times, data_type))
+    }
+
+    #[test]
+    fn a_clock_that_counts_from_1970_gives_absolute_times_that_are_not_read_back() {
+        let seconds = [1.7e9 + 0.25, 1.7e9 + 0.26, 12.0, 1e12];
+        let sample = |t_s| Sample { t_s, x_m: Some(0.1), ..Sample::default() };
+        let session = seconds.map(sample);
+        for &format in FORMATS {
+            let info = SessionInfo { first_t_s: Some(seconds[0]), ..SessionInfo::default() };
+            assert_eq!(samples(&write_with(&info, format, &session, 3)), session, "{format}");
+        }
+        let arrow = |first_t_s| {
+            let info = SessionInfo { first_t_s, ..SessionInfo::default() };
+            times(write_with(&info, SessionFormat::Arrow, &session, 3))
+        };
+        let micros = vec![Some(1_700_000_000_250_000), Some(1_700_000_000_260_000), None, None];
+        let (found, data_type) = arrow(Some(seconds[0])).unwrap();
+        assert_eq!((found, &*data_type), (micros, "Timestamp(µs, \"UTC\")"));
+        for other in [None, Some(0.0), Some(9.4e8), Some(4.2e9), Some(f64::NAN)] {
+            assert_eq!(arrow(other), None, "{other:?}");
+        }
     }
 
     /// An Arrow stream of other columns than those of offbd.

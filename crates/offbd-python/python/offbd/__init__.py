@@ -3,9 +3,13 @@
 Judges, calibrates and simulates recordings with the engine of the program `offbd`, and talks
 to its service. All quantities are in SI units: `t_s` in s, angles in rad, positions in m.
 
-A *recording* is anything with the Arrow PyCapsule interface (pandas, polars, pyarrow, DuckDB),
-or a mapping from column names to NumPy arrays or lists. Its columns are `t_s`, `cmd_qx_rad`,
-`cmd_qy_rad`, `x_m`, `y_m` and optionally `seq`; null and NaN are missing values.
+A *recording* is the path of a session file, in any format that the program reads; or anything
+with the Arrow PyCapsule interface (pandas, polars, pyarrow, DuckDB); or a mapping from column
+names to NumPy arrays or lists. The columns of a table are `t_s`, `cmd_qx_rad`, `cmd_qy_rad`,
+`x_m`, `y_m` and optionally `seq`; null and NaN are missing values. Those of a text or a sheet may
+have other names and units: the argument `columns` says which is which, such as
+"t_s=time/ms, x_m=ball_x/mm", or else `columns` of the asset; `rate_hz` is the number of rows a
+second of a text without a time.
 
 An *asset* is the description of a rig: the path of an asset file, a `dict`, or JSON text.
 Without one, the rig is that of the book chapter which offbd grew out of.
@@ -14,15 +18,19 @@ Without one, the rig is that of the book chapter which offbd grew out of.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from os import PathLike
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
 
 from . import _offbd
 from ._offbd import Table, __version__
 from .client import Acknowledgement, Client, ClientError, Event
+from .verdict import RejectedRow, Verdict
+
+if TYPE_CHECKING:
+    from . import documents as doc
 
 __all__ = [
     "Acknowledgement",
@@ -30,63 +38,51 @@ __all__ = [
     "ClientError",
     "Engine",
     "Event",
+    "Preset",
+    "Reference",
     "RejectedRow",
+    "SceneMethod",
+    "SceneModel",
     "SceneRun",
     "Simulation",
     "Table",
     "Verdict",
     "__version__",
     "calibrate",
+    "read",
     "replay",
     "rows",
     "scene",
     "simulate",
 ]
 
-Asset: TypeAlias = "dict[str, Any] | str | PathLike[str]"
-"""A rig: a `dict`, JSON text (which begins with a brace), or the path of an asset file."""
-
-
-@dataclass(frozen=True)
-class RejectedRow:
-    """A row that is no sample."""
-
-    row: int
-    """Number of the row, from 1."""
-    reason: str
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The result of judging a recording."""
-
-    faults: list[dict[str, Any]]
-    """The changes of faults, as the lines of `offbd replay --format json`."""
-    summary: dict[str, Any]
-    """The summary of the session, as the last line of `offbd replay --format json`."""
-    rejected: list[RejectedRow]
-    """The first rejected rows; `summary["rejected"]` is the number of all."""
-    n_set_aside: int
-    """Rows that are kept but not judged: too late, or too far ahead in time."""
-    evidence: Table | None
-    """The quantities of the diagnosis at each judged sample, if they were asked for."""
-
-    @property
-    def hash(self) -> str:
-        """SHA-256 of the verdict; equal judgements have equal hashes."""
-        return str(self.summary["verdict_hash"])
-
-    @property
-    def confirmed(self) -> list[str]:
-        """The codes of the confirmed faults."""
-        return list(self.summary["faults"])
+Asset: TypeAlias = "Mapping[str, Any] | str | PathLike[str]"
+"""A rig: a mapping, JSON text (which begins with a brace), or the path of an asset file."""
+Preset: TypeAlias = Literal["chapter", "pingpong", "touch"]
+"""A rig that is simulated."""
+Reference: TypeAlias = Literal["hold", "steps", "circle", "lissajous"]
+"""The motion that the controller of a simulated rig commands."""
+SceneModel: TypeAlias = Literal["planar", "rolling", "creeping", "sliding", "compliant"]
+"""A plant model of a scene."""
+SceneMethod: TypeAlias = Literal[
+    "zoh",
+    "euler",
+    "semi-implicit-euler",
+    "midpoint",
+    "rk4",
+    "dopri5",
+    "rodas3",
+    "rodas4",
+    "contact-step",
+]
+"""A method of integration."""
 
 
 @dataclass(frozen=True)
 class Simulation:
     """A simulated session."""
 
-    asset: dict[str, Any]
+    asset: doc.Asset
     """The rig as its owner would describe it."""
     table: Table
 
@@ -95,50 +91,76 @@ class Simulation:
 class SceneRun:
     """The run of a scene."""
 
-    model: str
-    method: str
+    model: SceneModel
+    method: SceneMethod
     table: Table
     """The trajectory in the plate frame."""
+
+
+def read(
+    path: str | PathLike[str],
+    asset: Asset | None = None,
+    *,
+    columns: str | None = None,
+    rate_hz: float | None = None,
+) -> list[Table]:
+    """Reads a session file; returns a table for each run. A file has one run unless the clock
+    of a text starts again. Warns if rows are rejected.
+
+    Raises OSError if the file cannot be read, and ValueError if it is not a recording.
+    """
+    return _offbd.read(path, _asset_text(asset), columns, rate_hz)
 
 
 def replay(
     recording: Any,
     asset: Asset | None = None,
     *,
-    profile: str | None = None,
-    session: str = "session",
+    profile: doc.Profile | None = None,
+    session: str | None = None,
     evidence: bool = False,
+    columns: str | None = None,
+    rate_hz: float | None = None,
 ) -> Verdict:
-    """Judges a recording, as `offbd replay` does.
+    """Judges a recording, as `offbd replay` does. A session without a name has that of its file.
 
-    Raises ValueError if the asset is invalid, a column is missing, or no row is usable.
+    Raises OSError if the file cannot be read, and ValueError if the asset is invalid, the file
+    is not a recording or has several runs, a column is missing, or no row is usable.
     """
     faults, summary, rejected, n_set_aside, table = _offbd.replay(
-        recording, _asset_text(asset), profile, session, evidence
+        recording, _asset_text(asset), profile, session, evidence, columns, rate_hz
     )
     bad_rows = [RejectedRow(row, reason) for row, reason in rejected]
     return Verdict(json.loads(faults), json.loads(summary), bad_rows, n_set_aside, table)
 
 
-def calibrate(asset: Asset, recordings: Sequence[Any]) -> dict[str, Any]:
-    """Calibrates a rig from healthy recordings, as `offbd calibrate` does; returns the asset
-    with the calibration.
+def calibrate(
+    asset: Asset,
+    recordings: Any,
+    *,
+    columns: str | None = None,
+    rate_hz: float | None = None,
+) -> doc.Asset:
+    """Calibrates a rig from a healthy recording or a sequence of them, as `offbd calibrate` does;
+    returns the asset with the calibration.
 
-    Raises ValueError that says what is missing if the data are not sufficient.
+    Raises OSError if a file cannot be read, and ValueError that says what is missing if the data
+    are not sufficient.
     """
     text = _asset_text(asset)
     assert text is not None
     made_at = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
-    learnt: dict[str, Any] = json.loads(_offbd.calibrate(text, list(recordings), made_at))
+    sources = list(recordings) if _is_sequence(recordings) else [recordings]
+    learnt: doc.Asset = json.loads(_offbd.calibrate(text, sources, made_at, columns, rate_hz))
     return learnt
 
 
 def simulate(
     *,
-    preset: str = "chapter",
+    preset: Preset = "chapter",
     rig_seed: int | None = None,
     asset: Asset | None = None,
-    reference: str = "steps",
+    reference: Reference = "steps",
     seconds: float = 60.0,
     seed: int = 1,
     faults: Sequence[str] = (),
@@ -157,8 +179,8 @@ def simulate(
 def scene(
     description: Asset,
     *,
-    model: str | None = None,
-    method: str | None = None,
+    model: SceneModel | None = None,
+    method: SceneMethod | None = None,
     step_s: float | None = None,
     tolerance_m: float = 1e-4,
     sample_s: float = 0.01,
@@ -168,18 +190,25 @@ def scene(
     """
     text = _asset_text(description)
     assert text is not None
-    return SceneRun(*_offbd.scene(text, model, method, step_s, tolerance_m, sample_s))
+    ran = _offbd.scene(text, model, method, step_s, tolerance_m, sample_s)
+    return SceneRun(cast(SceneModel, ran[0]), cast(SceneMethod, ran[1]), ran[2])
 
 
 class Engine:
-    """Judges the samples of one session as they come."""
+    """Judges the samples of one session as they come. A copy by `pickle` goes on as the original
+    does, to the bit; only the same version of offbd reads it.
+    """
 
     def __init__(
-        self, asset: Asset | None = None, *, profile: str | None = None, session: str = "session"
+        self,
+        asset: Asset | None = None,
+        *,
+        profile: doc.Profile | None = None,
+        session: str = "session",
     ) -> None:
         self._native = _offbd.NativeEngine(_asset_text(asset), profile, session)
 
-    def add(self, recording: Any) -> list[dict[str, Any]]:
+    def add(self, recording: Any) -> list[doc.Fault]:
         """Takes the samples of a recording; returns the changes of faults that they cause."""
         return _lines(self._native.add(recording))
 
@@ -192,14 +221,20 @@ class Engine:
         y_m: float | None,
         *,
         seq: int | None = None,
-    ) -> list[dict[str, Any]]:
+    ) -> list[doc.Fault]:
         """Takes one sample; returns the changes of faults that it causes."""
         return _lines(self._native.add_sample(t_s, (cmd_qx_rad, cmd_qy_rad), (x_m, y_m), seq))
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> doc.Summary:
         """The summary of the session so far."""
-        summary: dict[str, Any] = json.loads(self._native.summary())
+        summary: doc.Summary = json.loads(self._native.summary())
         return summary
+
+    def __getstate__(self) -> tuple[str, bytes]:
+        return self._native.state()
+
+    def __setstate__(self, state: tuple[str, bytes]) -> None:
+        self._native = _offbd.NativeEngine.of_state(*state)
 
     def end(self) -> Verdict:
         """Ends the session; returns its verdict, without rejected rows and evidence."""
@@ -214,8 +249,15 @@ def rows(table: Table) -> Iterator[dict[str, Any]]:
         yield dict(zip(columns, values, strict=True))
 
 
-def _lines(text: str) -> list[dict[str, Any]]:
-    lines: list[dict[str, Any]] = json.loads(text)
+def _is_sequence(recordings: Any) -> bool:
+    """Whether this is several recordings, not one: a table can be iterated, too."""
+    is_table = hasattr(recordings, "__arrow_c_stream__") or hasattr(recordings, "__arrow_c_array__")
+    is_one = is_table or isinstance(recordings, Mapping | str | PathLike)
+    return not is_one and isinstance(recordings, Iterable)
+
+
+def _lines(text: str) -> list[doc.Fault]:
+    lines: list[doc.Fault] = json.loads(text)
     return lines
 
 
@@ -223,8 +265,8 @@ def _asset_text(asset: Asset | None) -> str | None:
     """Returns the JSON text of an asset or a scene."""
     if asset is None:
         return None
-    if isinstance(asset, dict):
-        return json.dumps(asset)
+    if isinstance(asset, Mapping):
+        return json.dumps(dict(asset))
     if isinstance(asset, str) and asset.lstrip().startswith("{"):
         return asset
     with open(asset, encoding="utf-8") as file:

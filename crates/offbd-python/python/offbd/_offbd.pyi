@@ -1,8 +1,18 @@
 """The native part. Use the functions of the package `offbd`, which describe it."""
 
+from os import PathLike
 from typing import Any, final
 
-__all__ = ["NativeEngine", "Table", "__version__", "calibrate", "replay", "scene", "simulate"]
+__all__ = [
+    "NativeEngine",
+    "Table",
+    "__version__",
+    "calibrate",
+    "read",
+    "replay",
+    "scene",
+    "simulate",
+]
 
 __version__: str
 
@@ -10,6 +20,7 @@ __version__: str
 class Table:
     """A table of columns of equal length, with the Arrow PyCapsule interface."""
 
+    def __new__(cls, bytes: bytes) -> Table: ...
     @property
     def column_names(self) -> list[str]: ...
     def __len__(self) -> int: ...
@@ -29,16 +40,33 @@ class NativeEngine:
         seq: int | None,
     ) -> str: ...
     def summary(self) -> str: ...
+    def state(self) -> tuple[str, bytes]: ...
+    @staticmethod
+    def of_state(version: str, state: bytes) -> NativeEngine: ...
     def end(self) -> tuple[str, str]: ...
 
 def replay(
     recording: object,
     asset_file: str | None,
     profile: str | None,
-    session: str,
+    session: str | None,
     evidence: bool,
+    columns: str | None,
+    rate_hz: float | None,
 ) -> tuple[str, str, list[tuple[int, str]], int, Table | None]: ...
-def calibrate(asset_file: str, recordings: list[Any], made_at: str) -> str: ...
+def calibrate(
+    asset_file: str,
+    recordings: list[Any],
+    made_at: str,
+    columns: str | None,
+    rate_hz: float | None,
+) -> str: ...
+def read(
+    path: str | PathLike[str],
+    asset_file: str | None,
+    columns: str | None,
+    rate_hz: float | None,
+) -> list[Table]: ...
 def simulate(
     preset: str,
     rig_seed: int | None,

@@ -8,12 +8,16 @@ import logging
 import random
 import ssl
 import time
-import urllib.error
 import urllib.parse
-import urllib.request
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, cast
+
+from .connection import Connection, Reply, Request
+
+if TYPE_CHECKING:
+    from . import documents as doc
 
 ATTEMPT_TIMEOUT_S = 30.0
 """Longest time without an answer, s; then the request counts as failed."""
@@ -29,12 +33,19 @@ NO_CONTENT = 204
 """Status of an answer without content."""
 RETRIED = (408, 425, 429)
 """Statuses below 500 after which a request may succeed unchanged."""
+NEVER = (501, 505)
+"""Statuses from 500 on after which it will not."""
 FINAL = (400, 409, 413, 415, 422)
 """Statuses with which the service refuses samples for good, as all of its clients see it."""
 PROBLEM_TYPE = "urn:offbd:problem:"
 """How the types of the service's problems begin."""
 MAX_EXCERPT = 200
 """Most characters of an answer that an error repeats."""
+
+FaultFilter: TypeAlias = Literal["active", "pending", "confirmed", "healed", "cleared", "all"]
+"""Selects faults by status; active means pending or confirmed."""
+AlarmFilter: TypeAlias = Literal["failing", "on_record", "active", "all"]
+"""Selects alarms; active means failing or on record."""
 
 _log = logging.getLogger("offbd")
 
@@ -48,6 +59,12 @@ class ClientError(Exception):
         """The status of the answer; None without an answer."""
         self.problem = problem
         """The problem document (RFC 9457) of the answer, if it has one."""
+        self.retry_after_s = 0.0
+        """The delay that the service asks for, s."""
+
+    def at(self, place: str) -> ClientError:
+        """Returns the error with the request that failed."""
+        return ClientError(f"{place}: {self}", self.status, self.problem)
 
     @property
     def is_final(self) -> bool:
@@ -87,16 +104,19 @@ class Event:
     """A change of a fault's status."""
 
     id: int
-    data: dict[str, Any]
+    data: doc.FaultEvent
 
 
 class Client:
     """Talks to the service at `url`, with a bearer token if one is given.
 
-    A request that fails for a reason that may pass (no connection, 408, 425, 429, 5xx, an
-    answer that is not the service's) is sent again with growing delays, for `patience_s`
-    seconds at most; None means for ever. Each such failure is a warning of the logger `offbd`.
-    Sent telemetry is idempotent: a sample that arrives twice is stored once.
+    A request that fails for a reason that may pass (no connection, a cut answer, 408, 425, 429,
+    5xx but for 501 and 505) is sent again with growing delays, for `patience_s` seconds at most;
+    None means for ever. Each such failure is a warning of the logger `offbd`. Sent telemetry is
+    idempotent: a sample that arrives twice is stored once.
+
+    One connection stays open between requests, until `close` or the end of a `with` statement.
+    Threads may share a client.
     """
 
     def __init__(
@@ -107,25 +127,47 @@ class Client:
         patience_s: float | None = PATIENCE_S,
         context: ssl.SSLContext | None = None,
     ) -> None:
-        scheme = urllib.parse.urlsplit(url).scheme
-        if scheme not in ("http", "https"):
-            raise ValueError(f"the address of a service starts with http:// or https://: {url}")
         self._base = url.rstrip("/") + "/api/v1"
+        self._path = urllib.parse.urlsplit(self._base).path
+        self._connection = Connection(url, ATTEMPT_TIMEOUT_S, context)
         self._token = token
         self._patience_s = patience_s
-        self._context = context
 
-    def assets(self) -> list[dict[str, Any]]:
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the connection; a later request opens it again."""
+        self._connection.close()
+
+    def assets(self) -> list[doc.Asset]:
         """Returns all assets."""
         return list(self._items("/assets", {}))
 
-    def asset(self, name: str) -> dict[str, Any]:
-        """Returns an asset with its description and calibration."""
-        return self._object("GET", f"/assets/{_part(name)}")
+    def fleet(self) -> Iterator[doc.FleetEntry]:
+        """Yields an overview of each asset: its open session, its last data, its faults."""
+        return self._items("/fleet", {})
 
-    def put_asset(self, name: str, description: Mapping[str, Any]) -> dict[str, Any]:
+    def asset(self, name: str) -> doc.Asset:
+        """Returns an asset with its description and calibration."""
+        return cast("doc.Asset", self._object("GET", f"/assets/{_part(name)}"))
+
+    def state(self, asset: str) -> doc.State:
+        """Returns the present state of an asset: its evidence, its monitors, its twin."""
+        return cast("doc.State", self._object("GET", f"/assets/{_part(asset)}/state"))
+
+    def put_asset(self, name: str, description: Mapping[str, Any]) -> doc.Asset:
         """Registers the asset `name`, or replaces its description."""
-        return self._object("PUT", f"/assets/{_part(name)}", {**description, "name": name})
+        body = {**description, "name": name}
+        return cast("doc.Asset", self._object("PUT", f"/assets/{_part(name)}", body))
 
     def send(
         self, asset: str, samples: Iterable[Mapping[str, Any]], *, session: str | None = None
@@ -149,34 +191,34 @@ class Client:
             n_sent += len(batch)
         return total
 
-    def sessions(self, asset: str | None = None) -> Iterator[dict[str, Any]]:
+    def sessions(self, asset: str | None = None) -> Iterator[doc.Session]:
         """Yields the sessions of an asset, or of all."""
         return self._items("/sessions", {"asset": asset})
 
-    def session(self, session_id: str) -> dict[str, Any]:
+    def session(self, session_id: str) -> doc.Session:
         """Returns a session by the service's id."""
-        return self._object("GET", f"/sessions/{_part(session_id)}")
+        return cast("doc.Session", self._object("GET", f"/sessions/{_part(session_id)}"))
 
-    def end_session(self, session_id: str) -> dict[str, Any]:
+    def end_session(self, session_id: str) -> doc.Session:
         """Ends a session; returns it with its verdict."""
-        return self._object("POST", f"/sessions/{_part(session_id)}/end")
+        return cast("doc.Session", self._object("POST", f"/sessions/{_part(session_id)}/end"))
 
-    def recording(self, session_id: str) -> list[dict[str, Any]]:
+    def recording(self, session_id: str) -> list[doc.Sample]:
         """Returns the samples of a session."""
         answer = self._object("GET", f"/sessions/{_part(session_id)}/telemetry")
-        samples: list[dict[str, Any]] = answer["samples"]
+        samples: list[doc.Sample] = answer["samples"]
         return samples
 
     def import_session(
         self, asset: str, content: bytes, *, name: str | None = None, media_type: str = "text/csv"
-    ) -> dict[str, Any]:
+    ) -> doc.Import:
         """Imports the content of a recorded file as a session, and ends it; returns the session
         with its verdict, and the counts of rows. Without a `name`, a file is stored twice if the
         first answer is lost; with one, the second attempt is refused with 409. The media type
         says which format it is, such as application/vnd.apache.parquet.
         """
         path = f"/assets/{_part(asset)}/sessions/import" + _query({"name": name})
-        result: dict[str, Any] = self._answer("POST", path, content, media_type)
+        result: doc.Import = self._answer("POST", path, content, media_type)
         return result
 
     def series(
@@ -186,58 +228,96 @@ class Client:
         after: str | None = None,
         before: str | None = None,
         step_s: int | None = None,
-        aggregate: str | None = None,
-    ) -> dict[str, Any]:
+        aggregate: doc.SeriesAggregate | None = None,
+    ) -> doc.Series:
         """Returns the results of an asset's ended sessions over time, of those opened from
         `after` on and before `before`, both RFC 3339: a row for each session, or for each step
         of `step_s`.
         """
         query = {"from": after, "to": before, "step_s": step_s, "aggregate": aggregate}
-        return self._object("GET", f"/assets/{_part(asset)}/series" + _query(query))
+        path = f"/assets/{_part(asset)}/series"
+        return cast("doc.Series", self._object("GET", path + _query(query)))
 
     def faults(
-        self, asset: str | None = None, *, status: str = "active"
-    ) -> Iterator[dict[str, Any]]:
+        self, asset: str | None = None, *, status: FaultFilter = "active"
+    ) -> Iterator[doc.FaultEntry]:
         """Yields the faults of an asset, or of all."""
         path = "/faults" if asset is None else f"/assets/{_part(asset)}/faults"
         return self._items(path, {"status": status})
 
-    def acknowledge_fault(self, asset: str, code: str, by: str) -> dict[str, Any]:
+    def acknowledge_fault(self, asset: str, code: doc.FaultCode, by: str) -> doc.FaultEntry:
         """Acknowledges the present occurrence of a fault in the name of `by`; with a token, in
         that of the token.
         """
         path = f"/assets/{_part(asset)}/faults/{_part(code)}/acknowledge"
-        return self._object("POST", path + _query({"by": by}))
+        return cast("doc.FaultEntry", self._object("POST", path + _query({"by": by})))
 
-    def clear_fault(self, asset: str, code: str, by: str) -> None:
+    def clear_fault(self, asset: str, code: doc.FaultCode, by: str) -> None:
         """Erases the entry of a fault in the name of `by`; with a token, in that of the token."""
         path = f"/assets/{_part(asset)}/faults/{_part(code)}"
         self._answer("DELETE", path + _query({"by": by}))
 
-    def fault_history(self, asset: str, code: str) -> Iterator[dict[str, Any]]:
+    def fault_history(self, asset: str, code: doc.FaultCode) -> Iterator[doc.History]:
         """Yields the changes of a fault, newest first, and who acknowledged or cleared it."""
         return self._items(f"/assets/{_part(asset)}/faults/{_part(code)}/history", {})
 
     def alarms(
-        self, asset: str | None = None, *, state: str = "active"
-    ) -> Iterator[dict[str, Any]]:
+        self, asset: str | None = None, *, state: AlarmFilter = "active"
+    ) -> Iterator[doc.Alarm]:
         """Yields the alarms of an asset, or of all: faults that fail or are on record, and rigs
         whose data stay away. `state` is failing, on_record, active or all.
         """
         return self._items("/alarms", {"asset": asset, "state": state})
 
+    def learning(self, asset: str) -> doc.Learning:
+        """Returns what an asset has learnt by itself, and what it lacks."""
+        return cast("doc.Learning", self._object("GET", f"/assets/{_part(asset)}/learning"))
+
+    def accept_learning(self, asset: str, by: str) -> doc.Learning:
+        """Puts the calibration that an asset offers into use, in the name of `by`, who thereby
+        confirms that the rig was healthy; with a token, in that of the token.
+        """
+        path = f"/assets/{_part(asset)}/learning/accept"
+        return cast("doc.Learning", self._object("POST", path + _query({"by": by})))
+
+    def calibrate(
+        self, asset: str, session_ids: Sequence[str], by: str | None = None, *, poll_s: float = 0.2
+    ) -> doc.CalibrationJob:
+        """Calibrates an asset from healthy sessions; returns the finished job with the calibration,
+        which `activate_calibration` puts into use.
+        """
+        path = f"/assets/{_part(asset)}/calibrations"
+        body = {"sessions": list(session_ids)}
+        job = self._object("POST", path + _query({"by": by}), body)
+        return cast("doc.CalibrationJob", self._finished(path, job, poll_s))
+
+    def activate_calibration(
+        self, asset: str, calibration_id: str, by: str | None = None
+    ) -> doc.CalibrationJob:
+        """Puts the calibration of a job into use, from the next session on."""
+        path = f"/assets/{_part(asset)}/calibrations/{_part(calibration_id)}/activate"
+        return cast("doc.CalibrationJob", self._object("POST", path + _query({"by": by})))
+
     def replay(
-        self, session_id: str, settings: Mapping[str, Any] | None = None, *, poll_s: float = 0.2
-    ) -> dict[str, Any]:
+        self,
+        session_id: str,
+        settings: doc.ReplaySettings | None = None,
+        *,
+        poll_s: float = 0.2,
+    ) -> doc.Replay:
         """Judges a recorded session again, with other settings if given; returns the finished
         replay with its result.
         """
         job = self._object("POST", f"/sessions/{_part(session_id)}/replays", dict(settings or {}))
+        return cast("doc.Replay", self._finished("/replays", job, poll_s))
+
+    def _finished(self, path: str, job: dict[str, Any], poll_s: float) -> dict[str, Any]:
+        """Returns a job below `path` once it has finished. Raises ClientError if it has failed."""
         while job["state"] not in ("done", "failed"):
             time.sleep(poll_s)
-            job = self._object("GET", f"/replays/{_part(job['id'])}")
+            job = self._object("GET", f"{path}/{_part(job['id'])}")
         if job["state"] == "failed":
-            raise ClientError(f"the replay failed: {job['error']}")
+            raise ClientError(f"the job {path}/{job['id']} failed: {job['error']}")
         return job
 
     def events(self, asset: str | None = None, *, after: int | None = None) -> Iterator[Event]:
@@ -247,26 +327,28 @@ class Client:
         """
         delay_s = FIRST_DELAY_S
         while True:
-            query = _query({"asset": asset, "after": after})
+            request = self._request("GET", "/events" + _query({"asset": asset, "after": after}))
             try:
-                with self._open("GET", "/events" + query, None) as answer:
+                with self._connection.stream(request) as answer:
+                    if answer.status >= 300:
+                        reply = Reply(answer.status, answer.reason, answer.headers, answer.read())
+                        raise _refusal(reply)
                     for event_id, kind, data in _messages(answer):
                         after, delay_s = event_id, FIRST_DELAY_S
                         if kind == "fault":
                             yield Event(event_id, json.loads(data))
                 reason = "the answer has ended"
-            except urllib.error.HTTPError as error:
-                failure = _refusal(error)
-                if not _may_pass(error.code):
-                    raise failure from None
-                reason = str(failure)
+            except ClientError as error:
+                if not _may_pass(error.status):
+                    raise
+                reason = str(error)
             except (OSError, http.client.HTTPException) as error:
                 reason = _named(error)
             _log.warning("events of %s: %s; asking again", self._base, reason)
             time.sleep(delay_s * random.uniform(0.8, 1.2))
             delay_s = min(2 * delay_s, MAX_DELAY_S)
 
-    def _items(self, path: str, query: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    def _items(self, path: str, query: Mapping[str, Any]) -> Iterator[Any]:
         """Yields the items of all pages of a list."""
         cursor = None
         while True:
@@ -300,40 +382,39 @@ class Client:
         JSON of the answer, None if it has no content. An answer that is not expected is not
         the service's.
         """
+        request = self._request(method, path, content, kind)
         start = time.monotonic()
         delay_s = FIRST_DELAY_S
         while True:
             try:
-                with self._open(method, path, content, kind) as answer:
-                    return _value(answer, is_expected)
-            except urllib.error.HTTPError as error:
-                failure = _refusal(error)
-                if not _may_pass(error.code):
-                    raise failure from None
-                delay_s = max(delay_s, _retry_after_s(error))
-            except (OSError, http.client.HTTPException, ValueError) as error:
+                return _value(self._connection.send(request), is_expected)
+            except ClientError as error:
+                failure, may_pass = error, _may_pass(error.status)
+            except (OSError, http.client.HTTPException) as error:
                 failure = ClientError(_named(error))
-            pause_s = delay_s * random.uniform(0.8, 1.2)
+                # Any other exception of HTTP means that the peer does not speak it.
+                may_pass = isinstance(error, OSError | http.client.IncompleteRead)
             waited_s = time.monotonic() - start
+            pause_s = max(delay_s, failure.retry_after_s) * random.uniform(0.8, 1.2)
+            if not may_pass:
+                raise failure.at(f"{method} {self._base}{path}")
             if self._patience_s is not None and waited_s + pause_s > self._patience_s:
-                text = f"{method} {self._base}{path}: tried for {waited_s:.0f} s: {failure}"
-                raise ClientError(text, failure.status, failure.problem)
+                raise failure.at(f"{method} {self._base}{path}: tried for {waited_s:.0f} s")
             _log.warning(
                 "%s %s%s: %s; trying again in %.1f s", method, self._base, path, failure, pause_s
             )
             time.sleep(pause_s)
-            delay_s = min(2 * delay_s, MAX_DELAY_S)
+            delay_s = min(2 * max(delay_s, failure.retry_after_s), MAX_DELAY_S)
 
-    def _open(
-        self, method: str, path: str, content: bytes | None, kind: str = "application/json"
-    ) -> Any:
+    def _request(
+        self, method: str, path: str, content: bytes | None = None, kind: str = "application/json"
+    ) -> Request:
         headers = {"Accept": "application/json, text/event-stream"}
         if content is not None:
             headers["Content-Type"] = kind
         if self._token is not None:
             headers["Authorization"] = f"Bearer {self._token}"
-        request = urllib.request.Request(self._base + path, content, headers, method=method)
-        return urllib.request.urlopen(request, timeout=ATTEMPT_TIMEOUT_S, context=self._context)
+        return Request(method, self._path + path, content, headers)
 
 
 def _batches(samples: Iterable[Mapping[str, Any]]) -> Iterator[list[dict[str, Any]]]:
@@ -362,8 +443,9 @@ def _messages(lines: Iterable[bytes]) -> Iterator[tuple[int, str, str]]:
             fields = {}
 
 
-def _may_pass(status: int) -> bool:
-    return status in RETRIED or status >= 500
+def _may_pass(status: int | None) -> bool:
+    """Whether a request may succeed unchanged after an answer with this status, or after none."""
+    return status is None or status in RETRIED or (status >= 500 and status not in NEVER)
 
 
 def _acknowledges(n_sent: int) -> Callable[[Any], bool]:
@@ -379,19 +461,21 @@ def _acknowledges(n_sent: int) -> Callable[[Any], bool]:
     return is_acknowledgement
 
 
-def _value(answer: Any, is_expected: Callable[[Any], bool]) -> Any:
-    """Returns the JSON of an answer; ValueError if it is not one that is expected."""
-    if answer.status == NO_CONTENT:
+def _value(reply: Reply, is_expected: Callable[[Any], bool]) -> Any:
+    """Returns the JSON of an answer; ClientError if it is a refusal, or not what is expected."""
+    if reply.status >= 300:
+        raise _refusal(reply)
+    if reply.status == NO_CONTENT:
         return None
-    text = answer.read()
     try:
-        value = json.loads(text)
+        value = json.loads(reply.content)
         if is_expected(value):
             return value
     except ValueError:
         pass
-    told = _excerpt(text.decode(errors="replace"))
-    raise ValueError(f"{answer.status} {answer.reason}, but not an answer of offbd: {told}")
+    told = _excerpt(reply.content.decode(errors="replace"))
+    text = f"{reply.status} {reply.reason}, but not an answer of offbd: {told}"
+    raise ClientError(text, reply.status)
 
 
 def _named(error: Exception) -> str:
@@ -404,23 +488,23 @@ def _excerpt(text: str) -> str:
     return text if len(text) <= MAX_EXCERPT else text[:MAX_EXCERPT] + "…"
 
 
-def _refusal(error: urllib.error.HTTPError) -> ClientError:
+def _refusal(reply: Reply) -> ClientError:
     try:
-        text = error.read().decode(errors="replace")
-    except (OSError, http.client.HTTPException):
-        text = ""
-    try:
-        problem = json.loads(text)
+        problem = json.loads(reply.content)
         detail = problem.get("detail") or problem.get("title")
     except (ValueError, AttributeError):
-        problem, detail = None, _excerpt(text)
-    return ClientError(f"{error.code} {error.reason}: {detail}", error.code, problem)
+        problem, detail = None, _excerpt(reply.content.decode(errors="replace"))
+    if "Location" in reply.headers:
+        detail = f"the service is at {reply.headers['Location']}"
+    failure = ClientError(f"{reply.status} {reply.reason}: {detail}", reply.status, problem)
+    failure.retry_after_s = _retry_after_s(reply)
+    return failure
 
 
-def _retry_after_s(error: urllib.error.HTTPError) -> float:
+def _retry_after_s(reply: Reply) -> float:
     """Returns the delay that the service asks for, s, up to a minute."""
     try:
-        return min(max(float(error.headers.get("Retry-After", 0)), 0.0), 60.0)
+        return min(max(float(reply.headers.get("Retry-After", 0)), 0.0), 60.0)
     except ValueError:
         return 0.0
 

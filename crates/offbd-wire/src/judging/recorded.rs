@@ -7,6 +7,7 @@ use crate::verdict::{FaultView, SummaryView, fault_view};
 use offbd_core::diagnosis::{Evidence, FaultMemory, ServoEstimate};
 use offbd_core::engine::{Admission, Input, Misfit, Setup, State};
 use offbd_core::vocabulary::{PerAxis, Sample};
+use serde::{Deserialize, Serialize};
 
 /// Number of invalid rows of a recording that are reported one by one; further ones are only
 /// counted.
@@ -34,8 +35,9 @@ pub struct JudgedSession {
     pub misfits: Vec<Misfit>,
 }
 
-/// A recording that is being judged, row by row.
-#[derive(Debug)]
+/// A recording that is being judged, row by row. Its serialised form holds the whole state, as
+/// that of [`Judging`] does.
+#[derive(Debug, Serialize, Deserialize)]
 pub struct RecordedSession {
     name: String,
     judging: Judging,

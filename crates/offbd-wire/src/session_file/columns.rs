@@ -9,10 +9,12 @@ use arrow_array::types::{
     ArrowPrimitiveType, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type,
     Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, ArrayRef, Float64Array, Int64Array, RecordBatch};
-use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+use arrow_array::{
+    Array, ArrayRef, Float64Array, Int64Array, RecordBatch, TimestampMicrosecondArray,
+};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef, TimeUnit};
 
-use super::{RejectedRow, RowPlace, SessionFileError, SessionInfo, SessionRowError};
+use super::{RejectedRow, RowPlace, SessionFileError, SessionInfo, SessionRowError, unix_micros};
 use crate::session_csv::COLUMNS;
 use crate::telemetry::MAX_SEQ;
 use offbd_core::vocabulary::Sample;
@@ -20,11 +22,30 @@ use offbd_core::vocabulary::Sample;
 /// The name of the column with the numbers of the samples, which may be missing.
 const SEQ: &str = "seq";
 
+/// The name of the column with absolute times, which only tables of a clock that counts from 1970
+/// have. It is not read back.
+const TIME: &str = "time";
+
+/// The column with absolute times, if `info` says that the clock has them.
+pub(super) fn time_field(info: &SessionInfo) -> Option<Field> {
+    info.first_t_s.and_then(unix_micros)?;
+    let data_type = DataType::Timestamp(TimeUnit::Microsecond, Some("UTC".into()));
+    Some(Field::new(TIME, data_type, true))
+}
+
+/// The absolute times of `t_s`, s on the device's clock, if `schema` has a column for them.
+pub(super) fn times(schema: &Schema, t_s: impl Iterator<Item = f64>) -> Option<ArrayRef> {
+    schema.column_with_name(TIME)?;
+    let times = TimestampMicrosecondArray::from_iter(t_s.map(unix_micros));
+    Some(Arc::new(times.with_timezone("UTC")))
+}
+
 /// The schema of a session's file, with `info` as its metadata.
 pub(super) fn schema(info: &SessionInfo) -> SchemaRef {
     let [t_s, quantities @ ..] = COLUMNS;
-    let mut fields =
-        vec![Field::new(t_s, DataType::Float64, false), Field::new(SEQ, DataType::Int64, true)];
+    let mut fields = vec![Field::new(t_s, DataType::Float64, false)];
+    fields.extend(time_field(info));
+    fields.push(Field::new(SEQ, DataType::Int64, true));
     fields.extend(quantities.map(|name| Field::new(name, DataType::Float64, true)));
     let metadata = info.entries().map(|(key, value)| (key.to_owned(), value.to_owned()));
     Arc::new(Schema::new(fields).with_metadata(metadata.collect::<HashMap<_, _>>()))
@@ -37,14 +58,15 @@ pub(super) fn batch(schema: &SchemaRef, samples: &[Sample]) -> Result<RecordBatc
     };
     let t_s = Float64Array::from_iter_values(samples.iter().map(|s| s.t_s));
     let seq = samples.iter().map(|s| s.seq.and_then(|seq| i64::try_from(seq).ok()));
-    let columns = vec![
-        Arc::new(t_s) as ArrayRef,
-        Arc::new(Int64Array::from_iter(seq)),
+    let mut columns = vec![Arc::new(t_s) as ArrayRef];
+    columns.extend(times(schema, samples.iter().map(|s| s.t_s)));
+    columns.extend([
+        Arc::new(Int64Array::from_iter(seq)) as ArrayRef,
         column(|s| s.cmd_qx_rad),
         column(|s| s.cmd_qy_rad),
         column(|s| s.x_m),
         column(|s| s.y_m),
-    ];
+    ]);
     RecordBatch::try_new(schema.clone(), columns)
 }
 

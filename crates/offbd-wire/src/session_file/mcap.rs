@@ -2,8 +2,8 @@
 //!
 //! Each sample is a JSON message of the topic [`SAMPLES`]; only these are read back. A file
 //! that is written with an asset file also shows the rig (`mcap_scene.rs`), in Foxglove's own
-//! messages, which are in protobuf. All times are those
-//! of the device, whose clock may count from anywhere; times before its zero are shown at zero.
+//! messages, which are in protobuf. All times are those of the device. If its clock counts from 1970,
+//! they are absolute, as MCAP has them; times before the zero of the clock are shown at zero.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};

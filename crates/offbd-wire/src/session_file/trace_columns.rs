@@ -8,13 +8,15 @@ use std::sync::Arc;
 use arrow_array::{ArrayRef, BooleanArray, Float32Array, Float64Array, Int8Array, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 
+use super::{SessionInfo, columns};
 use crate::trace::{AxisTraceView, TraceView};
 
-/// The schema of a trace, with `entries` as its metadata.
-pub(super) fn schema(entries: &[(String, String)]) -> SchemaRef {
+/// The schema of a trace of the session of `info`, with `entries` as its metadata.
+pub(super) fn schema(info: &SessionInfo, entries: &[(String, String)]) -> SchemaRef {
     let float = |name| Field::new(name, DataType::Float32, true);
     let known = |name, data_type| Field::new(name, data_type, false);
     let mut fields = vec![Field::new("t_s", DataType::Float64, false)];
+    fields.extend(columns::time_field(info));
     for axis in ["x", "y"] {
         let name = |quantity: &str| format!("{axis}_{quantity}");
         fields.extend([
@@ -39,6 +41,7 @@ pub(super) fn schema(entries: &[(String, String)]) -> SchemaRef {
 /// The moments of `trace` as a record batch of `schema`.
 pub(super) fn batch(schema: &SchemaRef, trace: &TraceView) -> Result<RecordBatch, ArrowError> {
     let mut columns: Vec<ArrayRef> = vec![Arc::new(Float64Array::from(trace.t_s.clone()))];
+    columns.extend(columns::times(schema, trace.t_s.iter().copied()));
     columns.extend(axis(&trace.x));
     columns.extend(axis(&trace.y));
     for counter in [&trace.stuck_ball_counter, &trace.sensor_counter] {

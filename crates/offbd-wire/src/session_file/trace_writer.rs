@@ -89,7 +89,7 @@ mod columns {
         thresholds: &[ThresholdsView],
     ) -> Result<Box<dyn TraceEncoder>, SessionFileError> {
         let entries = entries(info, thresholds)?;
-        let schema = trace_columns::schema(&entries);
+        let schema = trace_columns::schema(info, &entries);
         let encoder = ParquetEncoder::wide(schema.clone(), entries.into_iter())?;
         Ok(Box::new(Table { schema, encoder }))
     }
@@ -98,7 +98,7 @@ mod columns {
         info: &SessionInfo,
         thresholds: &[ThresholdsView],
     ) -> Result<Box<dyn TraceEncoder>, SessionFileError> {
-        let schema = trace_columns::schema(&entries(info, thresholds)?);
+        let schema = trace_columns::schema(info, &entries(info, thresholds)?);
         let encoder = ArrowEncoder::of(schema.clone())?;
         Ok(Box::new(Table { schema, encoder }))
     }
