@@ -49,14 +49,9 @@ async fn round_of(port: u16, round: usize, bodies: &[Bytes], n_samples: usize) -
     let mut config = Config { data: data.path().to_owned(), ..Config::default() };
     config.listen.set_port(0);
     config.mqtt = Some(MqttConfig {
-        url: format!("mqtt://127.0.0.1:{port}"),
         client_id: Some(format!("offbd{round}")),
-        user: None,
-        password: None,
-        ca: None,
-        telemetry: true,
         faults: false,
-        mapping: None,
+        ..MqttConfig::at(format!("mqtt://127.0.0.1:{port}"))
     });
     let server = server::start(config).await?;
     register(server.address, 0..DEVICES).await?;

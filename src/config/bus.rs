@@ -158,6 +158,25 @@ impl NatsConfig {
 }
 
 impl MqttConfig {
+    /// A broker that needs no login, with the default of each key.
+    #[must_use]
+    pub const fn at(url: String) -> Self {
+        Self {
+            url,
+            client_id: None,
+            user: None,
+            password: None,
+            password_file: None,
+            ca: None,
+            certificate: None,
+            key: None,
+            telemetry: true,
+            faults: true,
+            state: false,
+            mapping: None,
+        }
+    }
+
     pub(super) fn check(&self, nats: bool) -> Result<(), ConfigError> {
         if !cfg!(feature = "mqtt") {
             return invalid("mqtt", "needs a build with MQTT: cargo build --features mqtt");
@@ -256,20 +275,7 @@ mod tests {
     }
 
     fn broker() -> MqttConfig {
-        MqttConfig {
-            url: "mqtt://a".to_owned(),
-            client_id: None,
-            user: None,
-            password: None,
-            password_file: None,
-            ca: None,
-            certificate: None,
-            key: None,
-            telemetry: true,
-            faults: true,
-            state: false,
-            mapping: None,
-        }
+        MqttConfig::at("mqtt://a".to_owned())
     }
 
     fn mqtt(change: impl FnOnce(&mut MqttConfig)) -> Result<BrokerAddress, String> {

@@ -359,18 +359,5 @@ impl Mosquitto {
 
 /// Returns the section of the service's configuration for a broker that everybody may use.
 pub fn mqtt_config(port: u16) -> offbd::config::MqttConfig {
-    offbd::config::MqttConfig {
-        url: format!("mqtt://127.0.0.1:{port}"),
-        client_id: None,
-        user: None,
-        password: None,
-        password_file: None,
-        ca: None,
-        certificate: None,
-        key: None,
-        telemetry: true,
-        faults: true,
-        state: false,
-        mapping: None,
-    }
+    offbd::config::MqttConfig::at(format!("mqtt://127.0.0.1:{port}"))
 }
