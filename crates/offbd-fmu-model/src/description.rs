@@ -32,7 +32,7 @@ pub fn model_description(setup: &Setup, version: FmiVersion) -> Result<String, I
     let values = StartValues::of(setup)?;
     let mut xml = head(setup, version);
     xml.push_str("  <ModelVariables>\n");
-    for (reference, variable) in VARIABLES.iter().enumerate() {
+    for (reference, variable) in described(version) {
         xml.push_str(&element(version, reference, variable, values.values()[reference]));
     }
     xml.push_str("  </ModelVariables>\n  <ModelStructure>\n");
@@ -62,6 +62,14 @@ fn head(setup: &Setup, version: FmiVersion) -> String {
         offbd = env!("CARGO_PKG_VERSION"),
         step = 1.0 / setup.rig.sample_rate_hz,
     )
+}
+
+/// Returns the variables of a model description, with their references. FMI 2.0 needs no variable
+/// of the time, and the FMI Library, by which many of its importers read an FMU, reports one
+/// without a start value as an error, though the standard forbids the value.
+fn described(version: FmiVersion) -> impl Iterator<Item = (usize, &'static Variable)> {
+    let is_described = move |v: &Variable| version == FmiVersion::V3 || v.role != Role::Time;
+    VARIABLES.iter().enumerate().filter(move |(_, variable)| is_described(variable))
 }
 
 /// Returns the element of a variable.
@@ -113,14 +121,14 @@ fn write_unknowns(
     kind: &str,
     wanted: impl Fn(Role) -> bool,
 ) {
-    let of_kind = VARIABLES.iter().enumerate().filter(|(_, v)| wanted(v.role)).map(|(i, _)| i);
+    let of_kind = described(version).enumerate().filter(|(_, (_, v))| wanted(v.role));
     match version {
         FmiVersion::V2 => {
-            let list: String =
-                of_kind.map(|i| format!("      <Unknown index=\"{}\"/>\n", i + 1)).collect();
+            let unknown = |(i, _)| format!("      <Unknown index=\"{}\"/>\n", i + 1);
+            let list: String = of_kind.map(unknown).collect();
             let _ = writeln!(xml, "    <{kind}s>\n{list}    </{kind}s>");
         }
-        FmiVersion::V3 => of_kind.for_each(|reference| {
+        FmiVersion::V3 => of_kind.for_each(|(_, (reference, _))| {
             let _ = writeln!(xml, r#"    <{kind} valueReference="{reference}"/>"#);
         }),
     }

@@ -9,6 +9,7 @@
 
 mod description;
 mod instance;
+mod licences;
 mod location;
 mod start_values;
 mod twin;
@@ -17,6 +18,7 @@ mod version;
 
 pub use description::{documentation, instantiation_token, model_description};
 pub use instance::{Instance, Refusal};
+pub use licences::LICENCES;
 pub use location::path_of_location;
 pub use start_values::StartValues;
 pub use variables::{Role, VARIABLES, Variable};

@@ -1,14 +1,14 @@
 //! FMUs: archives with the digital twin of a rig as a model of FMI 2.0 or 3.0.
 //!
-//! An FMU holds a description, a page about the model, the start values of the rig, and one
-//! shared library for each platform. The libraries are the same for all rigs and both versions.
+//! An FMU holds a description, a page about the model, licences, the start values of the rig, and
+//! one shared library for each platform. The libraries are the same for all rigs and both versions.
 
 use std::io::{Cursor, Write};
 
 use offbd_core::engine::Setup;
 use offbd_core::vocabulary::Invalid;
 pub use offbd_fmu_model::FmiVersion;
-use offbd_fmu_model::{MODEL_IDENTIFIER, StartValues, documentation, model_description};
+use offbd_fmu_model::{LICENCES, MODEL_IDENTIFIER, StartValues, documentation, model_description};
 use zip::result::ZipError;
 use zip::write::{SimpleFileOptions, ZipWriter};
 
@@ -102,6 +102,9 @@ pub fn archive(
     };
     add("modelDescription.xml", model_description(setup, version)?.as_bytes(), 0o644)?;
     add("documentation/index.html", documentation(setup, version)?.as_bytes(), 0o644)?;
+    for (file, text) in LICENCES {
+        add(&format!("documentation/licenses/{file}"), text.as_bytes(), 0o644)?;
+    }
     add(&format!("resources/{}", StartValues::FILE), start_values.as_bytes(), 0o644)?;
     for (platform, library) in libraries {
         add(&platform.place(version), library, 0o755)?;
@@ -148,7 +151,7 @@ mod tests {
         let fmu = made(&[library()]).unwrap();
         assert_eq!(fmu, made(&[library()]).unwrap());
         let mut files = zip::ZipArchive::new(Cursor::new(fmu)).unwrap();
-        assert_eq!(files.len(), 4);
+        assert_eq!(files.len(), 4 + LICENCES.len());
         let read = std::io::read_to_string(files.by_name(&platform.place(FmiVersion::V3)).unwrap())
             .unwrap();
         assert_eq!(read, "library");
