@@ -8,6 +8,10 @@ use offbd_core::vocabulary::Invalid;
 use crate::MODEL_IDENTIFIER;
 use crate::start_values::StartValues;
 use crate::variables::{Role, VARIABLES, Variable};
+use crate::version::FmiVersion;
+
+/// The licences of the model; their texts are in the FMU.
+const LICENSE: &str = env!("CARGO_PKG_LICENSE");
 
 /// The units, each with its exponents of base units, and the unit in which it is shown.
 const UNITS: &str = r#"  <UnitDefinitions>
@@ -24,49 +28,77 @@ const UNITS: &str = r#"  <UnitDefinitions>
 ///
 /// # Errors
 /// [`Invalid`] naming a variable, if the rig has a value that the model does not take.
-pub fn model_description(setup: &Setup) -> Result<String, Invalid> {
+pub fn model_description(setup: &Setup, version: FmiVersion) -> Result<String, Invalid> {
     let values = StartValues::of(setup)?;
-    let (name, version, token) =
-        (&setup.rig.name, env!("CARGO_PKG_VERSION"), instantiation_token());
-    let mut xml = format!(
-        r#"<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="{token}" description="Digital twin of a ball on a plate" version="{version}" generationTool="offbd {version}" variableNamingConvention="structured">
-  <CoSimulation modelIdentifier="{MODEL_IDENTIFIER}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true" canSerializeFMUState="true"/>
-{UNITS}  <LogCategories>
-    <Category name="logStatusError" description="Why a call is refused"/>
-  </LogCategories>
-  <DefaultExperiment startTime="0" stopTime="10" stepSize="{step}"/>
-  <ModelVariables>
-"#,
-        step = 1.0 / setup.rig.sample_rate_hz,
-    );
-    for (reference, variable) in VARIABLES.iter().enumerate() {
-        write_variable(&mut xml, reference, variable, values.values()[reference]);
+    let mut xml = head(setup, version);
+    xml.push_str("  <ModelVariables>\n");
+    for (reference, variable) in described(version) {
+        xml.push_str(&element(version, reference, variable, values.values()[reference]));
     }
     xml.push_str("  </ModelVariables>\n  <ModelStructure>\n");
-    write_references(&mut xml, "Output", |role| matches!(role, Role::State | Role::Output));
-    write_references(&mut xml, "InitialUnknown", |role| role == Role::Output);
+    write_unknowns(&mut xml, version, "Output", |role| matches!(role, Role::State | Role::Output));
+    write_unknowns(&mut xml, version, "InitialUnknown", |role| role == Role::Output);
     xml.push_str("  </ModelStructure>\n</fmiModelDescription>\n");
     Ok(xml)
 }
 
-fn write_variable(xml: &mut String, reference: usize, variable: &Variable, start: f64) {
-    let Variable { name, role, unit, description, range } = variable;
-    let _ = write!(
-        xml,
-        r#"    <Float64 name="{name}" valueReference="{reference}" description="{description}" {}"#,
-        attributes(*role)
-    );
-    if !unit.is_empty() {
-        let _ = write!(xml, r#" unit="{unit}""#);
+/// Returns what is before the variables.
+fn head(setup: &Setup, version: FmiVersion) -> String {
+    let (token, states, serialize) = match version {
+        FmiVersion::V2 => ("guid", "canGetAndSetFMUstate", "canSerializeFMUstate"),
+        FmiVersion::V3 => ("instantiationToken", "canGetAndSetFMUState", "canSerializeFMUState"),
+    };
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="{version}" modelName="{name}" {token}="{own}" description="Digital twin of a ball on a plate" version="{offbd}" license="{LICENSE}" generationTool="offbd {offbd}" variableNamingConvention="structured">
+  <CoSimulation modelIdentifier="{MODEL_IDENTIFIER}" canHandleVariableCommunicationStepSize="true" {states}="true" {serialize}="true"/>
+{UNITS}  <LogCategories>
+    <Category name="logStatusError" description="Why a call is refused"/>
+  </LogCategories>
+  <DefaultExperiment startTime="0" stopTime="10" stepSize="{step}"/>
+"#,
+        name = setup.rig.name,
+        own = instantiation_token(),
+        offbd = env!("CARGO_PKG_VERSION"),
+        step = 1.0 / setup.rig.sample_rate_hz,
+    )
+}
+
+/// Returns the variables of a model description, with their references. FMI 2.0 needs no variable
+/// of the time, and the FMI Library, by which many of its importers read an FMU, reports one
+/// without a start value as an error, though the standard forbids the value.
+fn described(version: FmiVersion) -> impl Iterator<Item = (usize, &'static Variable)> {
+    let is_described = move |v: &Variable| version == FmiVersion::V3 || v.role != Role::Time;
+    VARIABLES.iter().enumerate().filter(move |(_, variable)| is_described(variable))
+}
+
+/// Returns the element of a variable.
+fn element(version: FmiVersion, reference: usize, variable: &Variable, start: f64) -> String {
+    let Variable { name, role, description, .. } = variable;
+    let (attributes, number) = (attributes(*role), number(variable, start));
+    let common =
+        format!(r#"name="{name}" valueReference="{reference}" description="{description}""#);
+    match version {
+        FmiVersion::V2 => {
+            format!("    <ScalarVariable {common} {attributes}><Real{number}/></ScalarVariable>\n")
+        }
+        FmiVersion::V3 => format!("    <Float64 {common} {attributes}{number}/>\n"),
     }
-    if matches!(role, Role::Input | Role::Parameter) {
-        let _ = write!(xml, r#" min="{}" max="{}""#, range.start(), range.end());
+}
+
+/// Returns the unit, the range and the start value of a variable, as far as it has them.
+fn number(Variable { role, unit, range, .. }: &Variable, start: f64) -> String {
+    let mut attributes = String::new();
+    if !unit.is_empty() {
+        let _ = write!(attributes, r#" unit="{unit}""#);
+    }
+    if matches!(role, Role::Input | Role::FixedParameter | Role::TunableParameter) {
+        let _ = write!(attributes, r#" min="{}" max="{}""#, range.start(), range.end());
     }
     if !matches!(role, Role::Time | Role::Output) {
-        let _ = write!(xml, r#" start="{start}""#);
+        let _ = write!(attributes, r#" start="{start}""#);
     }
-    xml.push_str("/>\n");
+    attributes
 }
 
 const fn attributes(role: Role) -> &'static str {
@@ -75,14 +107,30 @@ const fn attributes(role: Role) -> &'static str {
         Role::Input => r#"causality="input""#,
         Role::State => r#"causality="output" initial="exact""#,
         Role::Output => r#"causality="output" initial="calculated""#,
-        Role::Parameter => r#"causality="parameter" variability="fixed""#,
+        Role::FixedParameter => r#"causality="parameter" variability="fixed""#,
+        Role::TunableParameter => r#"causality="parameter" variability="tunable""#,
         Role::Constant => r#"causality="local" variability="constant""#,
     }
 }
 
-fn write_references(xml: &mut String, element: &str, wanted: impl Fn(Role) -> bool) {
-    for (reference, _) in VARIABLES.iter().enumerate().filter(|(_, v)| wanted(v.role)) {
-        let _ = writeln!(xml, r#"    <{element} valueReference="{reference}"/>"#);
+/// Writes the elements of one kind of the structure of the model: FMI 2.0 puts them into a list,
+/// and counts the variables from 1.
+fn write_unknowns(
+    xml: &mut String,
+    version: FmiVersion,
+    kind: &str,
+    wanted: impl Fn(Role) -> bool,
+) {
+    let of_kind = described(version).enumerate().filter(|(_, (_, v))| wanted(v.role));
+    match version {
+        FmiVersion::V2 => {
+            let unknown = |(i, _)| format!("      <Unknown index=\"{}\"/>\n", i + 1);
+            let list: String = of_kind.map(unknown).collect();
+            let _ = writeln!(xml, "    <{kind}s>\n{list}    </{kind}s>");
+        }
+        FmiVersion::V3 => of_kind.for_each(|(_, (reference, _))| {
+            let _ = writeln!(xml, r#"    <{kind} valueReference="{reference}"/>"#);
+        }),
     }
 }
 
@@ -102,12 +150,12 @@ pub fn instantiation_token() -> String {
 ///
 /// # Errors
 /// [`Invalid`] naming a variable, if the rig has a value that the model does not take.
-pub fn documentation(setup: &Setup) -> Result<String, Invalid> {
+pub fn documentation(setup: &Setup, version: FmiVersion) -> Result<String, Invalid> {
     let values = StartValues::of(setup)?;
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
          <title>{name}</title>\n<h1>{name}: digital twin of a ball on a plate</h1>\n\
-         <p>Co-simulation by FMI 3.0. The commands hold from the begin of a communication step. \
+         <p>Co-simulation by FMI {version}. The commands hold from the begin of a communication step. \
          Each servo has a dead time, a lag, a rate limit and an angle limit, and is solved \
          exactly; at the start both stand on their commands. The ball rolls, or slides where \
          friction cannot hold it; the plate has no edge, and the mass of the ball has no effect. \
@@ -116,15 +164,33 @@ pub fn documentation(setup: &Setup) -> Result<String, Invalid> {
          outputs. Communication steps should be 1 ms or longer: in shorter ones the effect of the \
          plate&rsquo;s rates on the ball is underestimated. If a dead time is a multiple of the \
          step, rounding of the importer&rsquo;s times decides whether a servo begins to turn at the \
-         end of a step or at the start of the next, and the path differs by that step.</p>\n<table>\n<tr><th>variable<th>unit<th>start<th>what it is\n",
+         end of a step or at the start of the next, and the path differs by that step.</p>\n\
+         <p>A tunable parameter can also be set between two steps, to inject a fault; it holds \
+         from the next step on. A fixed parameter holds for the whole simulation. A servo without \
+         power has the command gain 0, one that is stuck the least rate limit, one whose horn has \
+         slipped another level, a slow one a longer lag and a lower rate limit.</p>\n\
+         <table>\n<tr><th>variable<th>kind<th>unit<th>start<th>what it is\n",
         name = setup.rig.name,
     );
     for (variable, start) in VARIABLES.iter().zip(values.values()) {
-        let Variable { name, unit, description, .. } = variable;
-        let _ = writeln!(html, "<tr><td>{name}<td>{unit}<td>{start}<td>{description}");
+        let Variable { name, role, unit, description, .. } = variable;
+        let kind = kind(*role);
+        let _ = writeln!(html, "<tr><td>{name}<td>{kind}<td>{unit}<td>{start}<td>{description}");
     }
     html.push_str("</table>\n</html>\n");
     Ok(html)
+}
+
+const fn kind(role: Role) -> &'static str {
+    match role {
+        Role::Time => "time",
+        Role::Input => "input",
+        Role::State => "output, set at the start",
+        Role::Output => "output",
+        Role::FixedParameter => "fixed parameter",
+        Role::TunableParameter => "tunable parameter",
+        Role::Constant => "constant",
+    }
 }
 
 #[cfg(test)]
@@ -145,9 +211,12 @@ mod tests {
     fn a_parameter_of_the_rig_is_a_start_value() {
         let mut rig = Rig::chapter("lab-3");
         rig.servo.lag_s = 0.085;
-        let xml = model_description(&Setup::new(rig, None).unwrap()).unwrap();
-        assert!(xml.contains(r#"modelName="lab-3""#));
-        let lag = xml.lines().find(|line| line.contains(r#""y_servo.lag""#)).unwrap();
-        assert!(lag.contains(r#"unit="s" min="0" max="10" start="0.085""#), "{lag}");
+        let setup = Setup::new(rig, None).unwrap();
+        for version in FmiVersion::ALL {
+            let xml = model_description(&setup, version).unwrap();
+            assert!(xml.contains(r#"modelName="lab-3""#));
+            let lag = xml.lines().find(|line| line.contains(r#""y_servo.lag""#)).unwrap();
+            assert!(lag.contains(r#"unit="s" min="0" max="10" start="0.085""#), "{lag}");
+        }
     }
 }

@@ -32,6 +32,8 @@ pub enum Refusal {
     OtherTime { from_s: f64, at_s: f64 },
     #[error("{0} is not a time")]
     NoTime(f64),
+    #[error("the location of the resources, {uri}, {why}")]
+    Location { uri: String, why: &'static str },
     #[error("the state was not saved by this model: {0}")]
     State(String),
 }
@@ -86,13 +88,22 @@ impl Instance {
         };
     }
 
-    /// Begins the initialization of a simulation that starts at `start_s`.
+    /// Sets the time at which the simulation starts, s; without this call it is 0.
     ///
     /// # Errors
-    /// [`Refusal`] if it has begun before, or the time is not finite.
-    pub fn enter_initialization(&mut self, start_s: f64) -> Result<(), Refusal> {
-        self.expect("the initialization", LifePhase::Instantiated)?;
+    /// [`Refusal`] if the initialization has begun before, or the time is not finite.
+    pub fn start_at(&mut self, start_s: f64) -> Result<(), Refusal> {
+        self.expect("a start time", LifePhase::Instantiated)?;
         self.values[TIME] = time(start_s)?.seconds();
+        Ok(())
+    }
+
+    /// Begins the initialization.
+    ///
+    /// # Errors
+    /// [`Refusal`] if it has begun before.
+    pub fn enter_initialization(&mut self) -> Result<(), Refusal> {
+        self.expect("the initialization", LifePhase::Instantiated)?;
         self.phase = LifePhase::Initialization;
         Ok(())
     }
@@ -138,8 +149,8 @@ impl Instance {
         let index = index(reference)?;
         let variable = &VARIABLES[index];
         let settable = match variable.role {
-            Role::Input => self.phase != LifePhase::Terminated,
-            Role::State | Role::Parameter => self.phase.is_before_steps(),
+            Role::Input | Role::TunableParameter => self.phase != LifePhase::Terminated,
+            Role::State | Role::FixedParameter => self.phase.is_before_steps(),
             Role::Time | Role::Output | Role::Constant => false,
         };
         if !settable {
@@ -150,7 +161,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Advances from `from_s`, the present time, by `step_s` under the present commands.
+    /// Advances from `from_s`, the present time, by `step_s` under the present commands and
+    /// parameters.
     ///
     /// # Errors
     /// [`Refusal`] if the initialization has not ended, the times do not fit or the step is
@@ -163,7 +175,9 @@ impl Instance {
         }
         in_range("step", step_s, f64::MIN_POSITIVE..=LONGEST_COMMUNICATION_STEP_S)?;
         let (commands, to) = (self.commands(), time(from_s + step_s)?);
+        let model = twin::model(&self.values)?;
         let Some(twin) = &mut self.twin else { return Ok(()) };
+        twin.retune(model);
         twin.command(commands.map(Some));
         twin.advance(to, self.values[LONGEST_STEP]);
         self.values[TIME] = to.seconds();

@@ -88,6 +88,7 @@ fn servo(axis: &TwinAxis) -> [f64; Y_SERVO - X_SERVO] {
         axis.servo.angle_limit_rad(),
         axis.servo.rate_limit_rad_s(),
         axis.dead_time_s,
+        axis.command_gain,
         axis.servo.lag_s(),
         axis.gain,
         axis.level_rad,

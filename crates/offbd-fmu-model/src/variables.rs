@@ -13,7 +13,10 @@ pub enum Role {
     /// An output whose start value can be set.
     State,
     Output,
-    Parameter,
+    /// A parameter that holds for the whole simulation.
+    FixedParameter,
+    /// A parameter that can also be set between two steps; it holds from the next step on.
+    TunableParameter,
     Constant,
 }
 
@@ -49,7 +52,7 @@ pub(crate) const X_SERVO: usize = 15;
 /// The first parameter of the y servo.
 pub(crate) const Y_SERVO: usize = X_SERVO + SERVO_PARAMETERS;
 /// The number of parameters of a servo.
-const SERVO_PARAMETERS: usize = 7;
+const SERVO_PARAMETERS: usize = 8;
 /// The number of variables.
 pub(crate) const COUNT: usize = Y_SERVO + SERVO_PARAMETERS;
 
@@ -72,80 +75,72 @@ pub const VARIABLES: [Variable; COUNT] = [
     readable("qx", Role::Output, "rad", "Angle of the plate about x"),
     readable("qy", Role::Output, "rad", "Angle of the plate about y"),
     readable("gravity", Role::Constant, "m/s2", "Acceleration of a free fall"),
-    parameter("ball_radius", "m", "Radius of the ball", LEAST..=1.0),
-    parameter(
+    fixed("ball_radius", "m", "Radius of the ball", LEAST..=1.0),
+    fixed(
         "inertia_factor",
         "",
         "Moment of inertia of the ball over its mass and squared radius: solid 0.4, hollow 0.667",
         0.0..=1.0,
     ),
-    parameter(
+    fixed(
         "plate_thickness",
         "m",
         "Thickness of the plate, with its joint in the middle",
         0.0..=1.0,
     ),
-    parameter("friction", "", "Coefficient of friction of ball and plate", LEAST..=100.0),
-    parameter(
+    tunable("friction", "", "Coefficient of friction of ball and plate", LEAST..=100.0),
+    fixed(
         "longest_step",
         "s",
         "Longest step of the integration; a longer communication step is divided",
         SimulatedTwin::STEPS_S,
     ),
-    parameter("x_servo.angle_limit", "rad", "Largest angle of the x servo", LEAST..=FRAC_PI_2),
-    parameter("x_servo.rate_limit", "rad/s", "Largest rate of the x servo", LEAST..=1000.0),
-    parameter(
+    tunable("x_servo.angle_limit", "rad", "Largest angle of the x servo", LEAST..=FRAC_PI_2),
+    tunable("x_servo.rate_limit", "rad/s", "Largest rate of the x servo", LEAST..=1000.0),
+    tunable(
         "x_servo.dead_time",
         "s",
         "Time from a command to the x servo's first movement",
         DEAD_TIME,
     ),
-    parameter("x_servo.lag", "s", "First-order lag of the x servo", 0.0..=10.0),
-    parameter(
+    tunable(
+        "x_servo.command_gain",
+        "",
+        "Angle that the x servo is asked for over its command: 0 without power, -1 if reversed",
+        -100.0..=100.0,
+    ),
+    tunable("x_servo.lag", "s", "First-order lag of the x servo", 0.0..=10.0),
+    tunable(
         "x_servo.gain",
         "",
         "Acceleration of the ball along x over that of the model",
         -100.0..=100.0,
     ),
-    parameter(
-        "x_servo.level",
-        "rad",
-        "Angle of the plate about y at a command of zero",
-        -1.0..=1.0,
-    ),
-    parameter(
-        "x_servo.resistance",
-        "m/s2",
-        "Deceleration of a ball that rolls along x",
-        0.0..=10.0,
-    ),
-    parameter("y_servo.angle_limit", "rad", "Largest angle of the y servo", LEAST..=FRAC_PI_2),
-    parameter("y_servo.rate_limit", "rad/s", "Largest rate of the y servo", LEAST..=1000.0),
-    parameter(
+    tunable("x_servo.level", "rad", "Angle of the plate about y at a command of zero", -1.0..=1.0),
+    tunable("x_servo.resistance", "m/s2", "Deceleration of a ball that rolls along x", 0.0..=10.0),
+    tunable("y_servo.angle_limit", "rad", "Largest angle of the y servo", LEAST..=FRAC_PI_2),
+    tunable("y_servo.rate_limit", "rad/s", "Largest rate of the y servo", LEAST..=1000.0),
+    tunable(
         "y_servo.dead_time",
         "s",
         "Time from a command to the y servo's first movement",
         DEAD_TIME,
     ),
-    parameter("y_servo.lag", "s", "First-order lag of the y servo", 0.0..=10.0),
-    parameter(
+    tunable(
+        "y_servo.command_gain",
+        "",
+        "Angle that the y servo is asked for over its command: 0 without power, -1 if reversed",
+        -100.0..=100.0,
+    ),
+    tunable("y_servo.lag", "s", "First-order lag of the y servo", 0.0..=10.0),
+    tunable(
         "y_servo.gain",
         "",
         "Acceleration of the ball along y over that of the model",
         -100.0..=100.0,
     ),
-    parameter(
-        "y_servo.level",
-        "rad",
-        "Angle of the plate about x at a command of zero",
-        -1.0..=1.0,
-    ),
-    parameter(
-        "y_servo.resistance",
-        "m/s2",
-        "Deceleration of a ball that rolls along y",
-        0.0..=10.0,
-    ),
+    tunable("y_servo.level", "rad", "Angle of the plate about x at a command of zero", -1.0..=1.0),
+    tunable("y_servo.resistance", "m/s2", "Deceleration of a ball that rolls along y", 0.0..=10.0),
 ];
 
 const DEAD_TIME: RangeInclusive<f64> = 0.0..=LONGEST_DEAD_TIME_S;
@@ -168,11 +163,20 @@ const fn readable(
     Variable { name, role, unit, description, range: f64::MIN..=f64::MAX }
 }
 
-const fn parameter(
+const fn fixed(
     name: &'static str,
     unit: &'static str,
     description: &'static str,
     range: RangeInclusive<f64>,
 ) -> Variable {
-    Variable { name, role: Role::Parameter, unit, description, range }
+    Variable { name, role: Role::FixedParameter, unit, description, range }
+}
+
+const fn tunable(
+    name: &'static str,
+    unit: &'static str,
+    description: &'static str,
+    range: RangeInclusive<f64>,
+) -> Variable {
+    Variable { name, role: Role::TunableParameter, unit, description, range }
 }

@@ -19,11 +19,10 @@ pub(crate) unsafe fn with(
 ) -> c_int {
     // SAFETY: by the contract above it points to a component that nothing else refers to.
     let Some(component) = (unsafe { pointer.cast::<Component>().as_mut() }) else { return ERROR };
-    let log = component.log;
-    match catch_unwind(AssertUnwindSafe(|| work(component))) {
+    match catch_unwind(AssertUnwindSafe(|| work(&mut *component))) {
         Ok(Ok(())) => OK,
         Ok(Err(RefusedCall(reason))) => {
-            log.error(&reason);
+            component.log.error(&reason);
             ERROR
         }
         Err(_) => FATAL,

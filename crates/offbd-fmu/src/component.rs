@@ -6,32 +6,51 @@ use std::ffi::{CString, c_char, c_int, c_void};
 
 use offbd_fmu_model::{Instance, Refusal};
 
-/// `fmi3Status`: the call succeeded.
+/// `fmi2Status` and `fmi3Status`: the call succeeded.
 pub(crate) const OK: c_int = 0;
-/// `fmi3Status`: the call was refused.
+/// `fmi2Status` and `fmi3Status`: the call was refused.
 pub(crate) const ERROR: c_int = 3;
-/// `fmi3Status`: the instance is of no use any more.
+/// `fmi2Status` and `fmi3Status`: the instance is of no use any more.
 pub(crate) const FATAL: c_int = 4;
+
+/// `fmi2CallbackLogger`: a format, and the values that it asks for.
+pub(crate) type LogFormat =
+    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 
 /// `fmi3LogMessageCallback`.
 pub(crate) type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
+/// The function by which an importer is told of a refusal.
+pub(crate) enum Logger {
+    /// Of FMI 2.0, with the name of the instance.
+    Format(LogFormat, CString),
+    /// Of FMI 3.0.
+    Message(LogMessage),
+}
+
 /// The importer's logger, with the pointer that it wants back.
-#[derive(Clone, Copy)]
 pub(crate) struct ImporterLog {
     pub environment: *mut c_void,
-    pub message: Option<LogMessage>,
+    pub logger: Option<Logger>,
 }
 
 impl ImporterLog {
     /// Tells the importer why a call is refused.
     pub(crate) fn error(&self, reason: &str) {
-        let (Some(message), Ok(text)) = (self.message, CString::new(reason)) else { return };
+        let category = c"logStatusError".as_ptr();
         // SAFETY: the importer has passed the function and its environment at the
-        // instantiation, to be called until the instance is freed; both strings live until
-        // the call ends.
-        unsafe {
-            message(self.environment, ERROR, c"logStatusError".as_ptr(), text.as_ptr());
+        // instantiation, to be called until the instance is freed; all strings live until the
+        // call ends. A format without a directive asks for no value.
+        match &self.logger {
+            None => {}
+            Some(Logger::Message(log)) => {
+                let Ok(text) = CString::new(reason) else { return };
+                unsafe { log(self.environment, ERROR, category, text.as_ptr()) }
+            }
+            Some(Logger::Format(log, name)) => {
+                let Ok(text) = CString::new(reason.replace('%', "%%")) else { return };
+                unsafe { log(self.environment, name.as_ptr(), ERROR, category, text.as_ptr()) }
+            }
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Functions of the standard for what this model does not have: other types than real numbers,
-//! clocks, events, model exchange and scheduled execution.
+//! Functions of the standards for what this model does not have: other types than real numbers,
+//! derivatives, clocks, events, model exchange and scheduled execution.
 
 #![expect(unsafe_code, reason = "the interface of FMI is C")]
 
@@ -27,6 +27,22 @@ macro_rules! not_offered {
 }
 
 not_offered!(
+    fmi2GetInteger,
+    fmi2GetBoolean,
+    fmi2GetString,
+    fmi2SetInteger,
+    fmi2SetBoolean,
+    fmi2SetString,
+    fmi2GetDirectionalDerivative,
+    fmi2SetRealInputDerivatives,
+    fmi2GetRealOutputDerivatives,
+    // A step ends before its call does, and is never discarded.
+    fmi2CancelStep,
+    fmi2GetStatus,
+    fmi2GetRealStatus,
+    fmi2GetIntegerStatus,
+    fmi2GetBooleanStatus,
+    fmi2GetStringStatus,
     fmi3EnterEventMode,
     fmi3GetFloat32,
     fmi3GetInt8,

@@ -30,6 +30,23 @@ fn an_fmu_has_the_values_of_the_rig_and_the_given_library() {
     assert!(values.contains("x_servo.lag 0.085\n"), "{values}");
     let description = String::from_utf8(read("modelDescription.xml")).unwrap();
     assert!(description.contains("modelName=\"lab-3\""), "{description}");
+    assert!(description.contains("fmiVersion=\"3.0\""), "{description}");
+    let licence = String::from_utf8(read("documentation/licenses/LICENSE-MIT.txt")).unwrap();
+    assert!(licence.contains("Permission is hereby granted"), "{licence}");
+}
+
+#[test]
+fn an_fmu_can_be_for_importers_of_fmi_2() {
+    let cli = CliFixture::new();
+    std::fs::write(cli.path("twin.so"), library()).unwrap();
+    cli.ok("export fmu --fmi 2.0 --library twin.so -o twin.fmu");
+    let fmu = std::fs::read(cli.path("twin.fmu")).unwrap();
+    let mut files = zip::ZipArchive::new(Cursor::new(fmu)).unwrap();
+    files.by_name("binaries/linux64/ball_on_plate.so").unwrap();
+    let description = std::io::read_to_string(files.by_name("modelDescription.xml").unwrap());
+    assert!(description.unwrap().contains("fmiVersion=\"2.0\""));
+    let other = cli.run(2, "export fmu --fmi 1.0 --library twin.so -o one.fmu").stderr;
+    assert!(other.contains("the versions are 2.0 and 3.0"), "{other}");
 }
 
 #[test]

@@ -197,6 +197,7 @@ impl Setup {
                         rig.servo.rate_limit_rad_s,
                     )?,
                     dead_time_s: learnt.dead_time_s,
+                    command_gain: 1.0,
                     gain: learnt.gain,
                     level_rad: learnt.level_rad,
                     resistance_m_s2: learnt.resistance_m_s2,
@@ -210,5 +211,12 @@ impl Setup {
 /// The parameters of both axes before anything is learnt.
 fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
     let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
-    Ok(TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 })
+    Ok(TwinAxis {
+        servo,
+        dead_time_s,
+        command_gain: 1.0,
+        gain: 1.0,
+        level_rad: 0.0,
+        resistance_m_s2: 0.0,
+    })
 }

@@ -51,6 +51,15 @@ impl SimulatedTwin {
         Self { twin, rolling, now: at, spin: ball.spin, rates: PerAxis::default() }
     }
 
+    /// Continues with the parameters of `model` from now on, as if the rig had changed: servos,
+    /// ball and the commands on their way stay as they are. A servo does not return to a command
+    /// that it has left, even if its dead time becomes longer. A level that jumps moves the plate
+    /// at once, without a push to the ball.
+    pub fn retune(&mut self, model: TwinModel) {
+        self.rolling = *model.ladder.rolling();
+        self.twin.retune(model);
+    }
+
     /// Gives commands, which hold from now on; without one, the servo keeps its command.
     pub fn command(&mut self, commands: PerAxis<Option<f64>>) {
         self.twin.command(commands);

@@ -43,6 +43,9 @@ pub struct TwinAxis {
     pub servo: ServoModel,
     /// Time from a command to the servo's first movement, s.
     pub dead_time_s: f64,
+    /// Angle that the servo is asked for over its command, dimensionless; 1 unless a fault is
+    /// simulated. It acts after the dead time and before the angle limit.
+    pub command_gain: f64,
     /// Measured over modelled acceleration, dimensionless; 1 if units and ball are as the
     /// asset file states.
     pub gain: f64,
@@ -141,6 +144,12 @@ impl Twin {
         }
     }
 
+    /// Continues with the parameters of `model`: the servos and the ball stay as they are, and
+    /// the commands that are remembered stay too.
+    pub(super) const fn retune(&mut self, model: TwinModel) {
+        self.model = model;
+    }
+
     /// The model in use and why it was selected.
     #[must_use]
     pub const fn fidelity(&self) -> &Fidelity {
@@ -221,8 +230,10 @@ impl Twin {
 
     fn settle(&mut self, commands: PerAxis<Option<f64>>) {
         for axis in Axis::ALL {
-            let limit = self.model.axes[axis].servo.angle_limit_rad();
-            let angle = commands[axis].unwrap_or(0.0).clamp(-limit, limit);
+            let model = &self.model.axes[axis];
+            let limit = model.servo.angle_limit_rad();
+            let asked = model.command_gain * commands[axis].unwrap_or(0.0);
+            let angle = asked.clamp(-limit, limit);
             self.servos[axis] = ServoState { angle, ..ServoState::default() };
         }
     }
@@ -289,7 +300,8 @@ impl Twin {
             let (command, next) = self.commands[axis].in_force(at);
             let until = next.filter(|&n| n < end).unwrap_or(end);
             let part_s = until - at;
-            swept = swept.then(&model.servo.sweep(&swept.servo, command, part_s), part_s);
+            let asked = model.command_gain * command;
+            swept = swept.then(&model.servo.sweep(&swept.servo, asked, part_s), part_s);
             if until == end {
                 return swept;
             }
@@ -331,7 +343,14 @@ mod tests {
 
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
-        let axis = TwinAxis { servo, dead_time_s, gain: 1.0, level_rad: 0.0, resistance_m_s2: 0.0 };
+        let axis = TwinAxis {
+            servo,
+            dead_time_s,
+            command_gain: 1.0,
+            gain: 1.0,
+            level_rad: 0.0,
+            resistance_m_s2: 0.0,
+        };
         // Zero accuracy: compared with the rolling ball, nothing may be neglected.
         let ladder = Ladder::new(&Ball::default(), &Plate::default(), 0.6, 0.0);
         Twin::new(TwinModel::new(ladder, axis))

@@ -9,22 +9,27 @@ use clap::Args;
 use crate::judge;
 use offbd_terminal::errors::{InputError, read};
 use offbd_terminal::output::{self, NewFile};
-use offbd_wire::fmu::{FmuPlatform, archive};
+use offbd_wire::fmu::{FmiVersion, FmuPlatform, archive};
 
 /// Writes the digital twin of a rig as an FMU, for other simulators.
 ///
-/// An FMU (FMI 3.0, co-simulation) runs in other simulators; it is tested with FMPy and
-/// ecos. Its inputs are the commands of both servos in rad; its outputs are the
-/// position and velocity of the ball and the angles of the plate. The parameters start
-/// with the values of the asset file, calibrated if it is.
+/// An FMU (co-simulation by FMI 3.0 or 2.0) runs in other simulators. Its inputs are the
+/// commands of both servos in rad; its outputs are the position and velocity of the ball
+/// and the angles of the plate. The parameters start with the values of the asset file,
+/// calibrated if it is; those of the servos can be changed while the FMU runs, to inject
+/// a fault.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     cargo build --release --package offbd-fmu\n  \
     offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n  \
+    offbd export fmu --fmi 2.0 -o ball_on_plate.fmu\n  \
     offbd export fmu --library liboffbd_fmu.so --library offbd_fmu.dll -o both.fmu\n\n\
     An FMU holds a shared library for each platform on which it runs. cargo builds\n\
     the one for this platform, beside the program, where it is found.")]
 pub(crate) struct FmuArgs {
+    /// The version of FMI: 3.0, or 2.0, which more simulators read
+    #[arg(long, value_name = "VERSION", default_value_t = FmiVersion::V3)]
+    fmi: FmiVersion,
     /// The rig's asset file [default: the default rig (plate 0.38 × 0.24 m, steel ball)]
     #[arg(long, value_name = "ASSET.json")]
     asset: Option<PathBuf>,
@@ -44,7 +49,8 @@ pub(super) fn run(args: &FmuArgs) -> anyhow::Result<()> {
     let own = if args.library.is_empty() { vec![beside_program()?] } else { Vec::new() };
     let libraries: Result<Vec<_>, InputError> =
         args.library.iter().chain(&own).map(|path| library(path)).collect();
-    let fmu = archive(&setup, &libraries?).map_err(|error| InputError::new(name, error))?;
+    let fmu =
+        archive(&setup, args.fmi, &libraries?).map_err(|error| InputError::new(name, error))?;
     if args.output == Path::new("-") {
         let mut out = output::stdout();
         out.write_all(&fmu)?;

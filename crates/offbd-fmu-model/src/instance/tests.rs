@@ -3,14 +3,16 @@ use crate::variables::{BALL_RADIUS, INERTIA_FACTOR, PLATE_THICKNESS, X_SERVO};
 use offbd_core::engine::{Rig, Setup, free_run};
 use offbd_core::vocabulary::Sample;
 
-const LAG: usize = X_SERVO + 3;
+const COMMAND_GAIN: usize = X_SERVO + 3;
+const LAG: usize = X_SERVO + 4;
+const LEVEL: usize = X_SERVO + 6;
 const DEAD_TIME: usize = X_SERVO + 2;
 
 fn instance(values: &[(usize, f64)]) -> Instance {
     let setup = Setup::new(Rig::chapter("chapter"), None).unwrap();
     let mut instance = Instance::new(&StartValues::of(&setup).unwrap());
     values.iter().for_each(|&(index, value)| instance.set(index as u32, value).unwrap());
-    instance.enter_initialization(0.0).unwrap();
+    instance.enter_initialization().unwrap();
     instance.exit_initialization().unwrap();
     instance
 }
@@ -45,6 +47,60 @@ fn validate_the_plate_against_the_exponential() {
     let angle = instance.get(QY as u32).unwrap();
     let wanted = 0.1 * (1.0 - (-(0.1 - 0.02) / 0.05_f64).exp());
     assert!((angle - wanted).abs() < 1e-12, "{angle}");
+}
+
+/// Runs on from `from_s` to `to_s` in steps of 10 ms, with the command 0.1 rad.
+fn hold(instance: &mut Instance, from_s: f64, to_s: f64) {
+    instance.set(COMMAND_QY as u32, 0.1).unwrap();
+    for i in 0..((to_s - from_s) / 0.01).round() as u32 {
+        instance.step(from_s + f64::from(i) * 0.01, 0.01).unwrap();
+    }
+}
+
+/// A servo that loses a part of its gain, and becomes slower, moves from where it is by the
+/// exponential of the new lag, at once: the dead time is that of commands.
+#[test]
+fn validate_a_gain_set_in_mid_run_against_the_exponential() {
+    let mut instance = instance(&[(LAG, 0.05), (DEAD_TIME, 0.5), (COMMAND_QY, 0.1)]);
+    hold(&mut instance, 0.0, 1.0);
+    instance.set(COMMAND_GAIN as u32, -0.4).unwrap();
+    instance.set(LAG as u32, 0.2).unwrap();
+    assert_eq!(instance.get(QY as u32), Ok(0.1));
+    hold(&mut instance, 1.0, 1.3);
+    let angle = instance.get(QY as u32).unwrap();
+    let wanted = -0.04 + 0.14 * (-0.3 / 0.2_f64).exp();
+    assert!((angle - wanted).abs() < 1e-12, "{angle} is not {wanted}");
+}
+
+/// A horn that slips tilts the plate by its level, without a push to the ball.
+#[test]
+fn validate_a_level_set_in_mid_run_against_the_parabola() {
+    let mut instance = instance(&[(VX, 0.2)]);
+    run(&mut instance, 100, 0.01, |_| 0.0);
+    instance.set(LEVEL as u32, 0.05).unwrap();
+    instance.step(1.0, 0.5).unwrap();
+    assert_eq!(instance.get(QY as u32), Ok(0.05));
+    let x = instance.get(X as u32).unwrap();
+    let wanted = 0.2 * 1.5 + 9.81 / 1.4 * 0.05_f64.sin() * 0.5 * 0.5 * 0.5;
+    assert!((x - wanted).abs() < 1e-12, "{x} is not {wanted}");
+}
+
+/// A longer dead time holds back the commands that the servo has not obeyed, and no others.
+#[test]
+fn validate_a_dead_time_set_in_mid_run_against_the_exponential() {
+    let mut instance = instance(&[(LAG, 0.05), (DEAD_TIME, 0.1)]);
+    let mut at = |dead_time_s, from_s, to_s| {
+        instance.set(DEAD_TIME as u32, dead_time_s).unwrap();
+        hold(&mut instance, from_s, to_s);
+        instance.get(QY as u32).unwrap()
+    };
+    let turned = |seconds: f64| 0.1 * (1.0 - (-seconds / 0.05).exp());
+    assert_eq!(at(0.1, 0.0, 0.05), 0.0);
+    assert_eq!(at(0.3, 0.05, 0.3), 0.0);
+    for (dead_time_s, from_s, to_s) in [(0.3, 0.3, 0.35), (2.0, 0.35, 0.4)] {
+        let angle = at(dead_time_s, from_s, to_s);
+        assert!((angle - turned(to_s - 0.3)).abs() < 1e-12, "{angle} at {to_s} s");
+    }
 }
 
 /// The model moves as the twin under the same commands, recorded, whose samples are between the
@@ -105,6 +161,8 @@ fn what_does_not_fit_is_refused_in_words() {
     let mut instance = instance(&[]);
     let radius = instance.set(BALL_RADIUS as u32, 0.02).unwrap_err().to_string();
     assert_eq!(radius, "ball_radius cannot be set after the initialization");
+    let lag = instance.set(LAG as u32, -1.0).unwrap_err().to_string();
+    assert_eq!(lag, "x_servo.lag: -1 is outside 0 to 10");
     let late = instance.step(0.5, 0.01).unwrap_err().to_string();
     assert_eq!(late, "the step begins at 0.5 s, but the last one ended at 0 s");
     assert!(matches!(instance.step(0.0, 0.0), Err(Refusal::Value(_))));
@@ -124,7 +182,8 @@ fn what_does_not_fit_is_refused_in_words() {
 fn start_values_are_outputs_during_the_initialization() {
     let setup = Setup::new(Rig::chapter("chapter"), None).unwrap();
     let mut instance = Instance::new(&StartValues::of(&setup).unwrap());
-    instance.enter_initialization(3.0).unwrap();
+    instance.start_at(3.0).unwrap();
+    instance.enter_initialization().unwrap();
     instance.set(COMMAND_QY as u32, 0.5).unwrap();
     instance.set(Y as u32, 0.04).unwrap();
     // The servo's limit is 0.2 rad.
