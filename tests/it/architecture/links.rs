@@ -25,6 +25,22 @@ fn every_link_between_documents_leads_somewhere() {
     assert!(dead.is_empty(), "\n{}\n", dead.join("\n"));
 }
 
+#[test]
+fn every_document_is_a_chapter_of_the_book() {
+    let docs = Path::new(ROOT).join("docs");
+    let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).unwrap();
+    let resolve = |path: &Path| std::fs::canonicalize(path).unwrap();
+    let chapters: Vec<_> =
+        links(&summary).iter().map(|(_, link)| resolve(&docs.join(link))).collect();
+    let all = pages().into_iter().chain(PARTS.map(str::to_owned));
+    for document in all.filter(|document| document != "docs/SUMMARY.md") {
+        let n = chapters
+            .iter()
+            .filter(|&chapter| *chapter == resolve(&Path::new(ROOT).join(&document)));
+        assert_eq!(n.count(), 1, "{document} in docs/SUMMARY.md");
+    }
+}
+
 /// Returns the anchors of a file, which has none if it is not a document; `None` if it does not
 /// exist.
 fn anchors_of(path: &Path) -> Option<BTreeSet<String>> {
