@@ -148,7 +148,8 @@ fn every_channel_is_tested() {
     let buses = ["ack", "fault", "hello", "state", "telemetry"];
     let of_buses = buses.iter().flat_map(|name| [format!("{name}Mqtt"), format!("{name}Nats")]);
     let mut tested = Vec::from_iter(of_buses);
-    tested.extend(["faultMarkerMqtt", "stream", "events", "webhook"].map(str::to_owned));
+    let others = ["faultMarkerMqtt", "serviceStateMqtt", "stream", "events", "webhook"];
+    tested.extend(others.map(str::to_owned));
     tested.sort();
     assert_eq!(described.channels(), tested);
 }

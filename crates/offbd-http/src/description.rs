@@ -21,8 +21,8 @@ use serde_json::json;
 use self::examples::Examples;
 use super::routes::operations_mut;
 use offbd_wire::problem::{
-    BUSY, CHANGED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MEDIA_TYPE, MISDIRECTED, ProblemType,
-    SLOW_BODY, TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
+    BUSY, CHANGED, FAILED, FORBIDDEN, MALFORMED, MALFORMED_QUERY, MEDIA_TYPE, MISDIRECTED,
+    ProblemType, SLOW_BODY, TOO_LARGE, UNAUTHENTICATED, UNAVAILABLE,
 };
 
 const PROBLEM: &str = "application/problem+json";
@@ -31,10 +31,11 @@ const PROBLEM: &str = "application/problem+json";
 type SharedResponse = (&'static ProblemType, &'static str, &'static str);
 
 /// Responses of every operation; the query is checked also where it has no parameters.
-const ALWAYS: [SharedResponse; 4] = [
+const ALWAYS: [SharedResponse; 5] = [
     (MALFORMED_QUERY, "InvalidParameter", "Invalid path or query parameter"),
     (MISDIRECTED, "MisdirectedRequest", "Unknown host name in `Host`, while authentication is off"),
     (BUSY, "TooManyRequests", "Too many requests; see `Retry-After`"),
+    (FAILED, "InternalError", "An error of the service, or a damaged store"),
     (UNAVAILABLE, "ServiceUnavailable", "Temporarily unavailable; see `Retry-After`"),
 ];
 

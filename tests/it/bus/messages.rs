@@ -28,7 +28,8 @@ impl Observer {
         let names = ["ack", "fault", "hello", "state", "telemetry"];
         let mut channels: Vec<_> =
             names.iter().map(|name| format!("{name}{}", self.suffix)).collect();
-        channels.extend((self.suffix == "Mqtt").then(|| "faultMarkerMqtt".to_owned()));
+        let own = ["faultMarkerMqtt", "serviceStateMqtt"].map(str::to_owned);
+        channels.extend((self.suffix == "Mqtt").then_some(own).into_iter().flatten());
         channels
     }
 
@@ -37,9 +38,11 @@ impl Observer {
         let found = async {
             loop {
                 let (topic, payload) = self.published.next().await.unwrap();
-                let level = match topic.split(['/', '.']).nth(3).unwrap() {
-                    "faults" => "faultMarker",
-                    level => level,
+                let levels: Vec<&str> = topic.split(['/', '.']).skip(3).collect();
+                let level = match levels[..] {
+                    ["faults"] => "faultMarker",
+                    [_, "state"] => "serviceState",
+                    _ => levels[0],
                 };
                 let channel = format!("{level}{}", self.suffix);
                 if self.described.note(&channel, &document(level, &payload)) == wanted {
@@ -53,7 +56,7 @@ impl Observer {
 
 /// Returns the content of a message: a text, or a document as JSON or MessagePack.
 fn document(level: &str, payload: &[u8]) -> Value {
-    if payload.is_empty() || level == "state" {
+    if payload.is_empty() || ["state", "serviceState"].contains(&level) {
         return String::from_utf8(payload.to_vec()).unwrap().into();
     }
     let json = serde_json::from_slice(payload);
@@ -98,7 +101,7 @@ async fn messages_over_mqtt_are_as_described() {
     let mut subscriber = MqttDevice::connect(mosquitto.port, "observer", None).await;
     subscriber.subscribe("offbd/v1/#").await;
     let fixture = crate::bus::start_with(|config| {
-        config.mqtt = Some(mosquitto.config());
+        config.mqtt = Some(offbd::config::MqttConfig { state: true, ..mosquitto.config() });
         quick(config);
     })
     .await;
