@@ -28,6 +28,16 @@ function tabs([first, , third]: string[], isAdmin: boolean) {
   ];
 }
 
+/**
+ * Scrolls to the link of the current view: on a phone not all links are on the screen. Not by
+ * `scrollIntoView`, after which browsers let the Tab key go on from there.
+ */
+function showCurrent(nav: HTMLElement) {
+  const link = nav.querySelector("[aria-current]")?.getBoundingClientRect();
+  const { left, right } = nav.getBoundingClientRect();
+  if (link) nav.scrollLeft += Math.max(link.right - right, 0) - Math.max(left - link.left, 0);
+}
+
 /** The header of every view. */
 export function Header({ segments }: { segments: string[] }) {
   const [connection, setConnection] = useState(fleetEvents.state);
@@ -38,10 +48,7 @@ export function Header({ segments }: { segments: string[] }) {
   const openAlarms = useOpenAlarms();
   const [first] = segments;
   const nav = useRef<HTMLElement>(null);
-  // On a phone not all links are on the screen.
-  useEffect(() => {
-    nav.current!.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest", inline: "nearest" });
-  }, [first]);
+  useEffect(() => showCurrent(nav.current!), [first]);
   return (
     <header class="top">
       <Link to="/" class="brand">
