@@ -69,7 +69,15 @@ def needed(schemas: dict[str, Any]) -> dict[str, Any]:
     while to_do:
         found |= to_do
         to_do = set[str]().union(*(named(schemas[name]) for name in to_do)) - found
-    return {name: schema for name, schema in schemas.items() if name in found}
+    return {name: plain(schema) for name, schema in schemas.items() if name in found}
+
+
+def plain(schema: dict[str, Any]) -> dict[str, Any]:
+    """Returns `schema` without the fields that no class can have, such as `$schema`."""
+    if "properties" not in schema:
+        return schema
+    properties = schema["properties"].items()
+    return schema | {"properties": {k: v for k, v in properties if k.isidentifier()}}
 
 
 def generated() -> str:

@@ -2020,22 +2020,33 @@ class Session(TypedDict):
     verdict: NotRequired[Summary | None]
 
 
-Asset = TypedDict(
-    "Asset",
-    {
-        "$schema": NotRequired[str | None],
-        "axes": NotRequired[Axes | None],
-        "ball": NotRequired[Ball],
-        "calibration": NotRequired[Calibration | None],
-        "columns": NotRequired[str | None],
-        "contact": NotRequired[Contact | None],
-        "diagnostics": NotRequired[Diagnostics | None],
-        "name": str,
-        "plate": NotRequired[Plate],
-        "sample_rate_hz": NotRequired[float],
-        "servo": NotRequired[Servo],
-    },
-)
+class Asset(TypedDict):
+    """
+    The description of a rig by its owner. Everything but `name` has a default: that of
+    the default rig (plate 0.38 × 0.24 m, steel ball; see `docs/notation.md`).
+    """
+
+    axes: NotRequired[Axes | None]
+    ball: NotRequired[Ball]
+    calibration: NotRequired[Calibration | None]
+    columns: NotRequired[str | None]
+    """
+    Which columns of the rig's files are which quantities, such as
+    `t_s=time/ms, x_m=ball_x/mm` (the parameter `columns` of an import, `--columns` of the
+    commands). Used for files that have the columns it names, unless a mapping is given.
+    """
+    contact: NotRequired[Contact | None]
+    diagnostics: NotRequired[Diagnostics | None]
+    name: str
+    """
+    Name of the asset: 1 to 128 letters, digits, `-`, `_` or `.`.
+    """
+    plate: NotRequired[Plate]
+    sample_rate_hz: NotRequired[float]
+    """
+    Approximate number of samples that the device sends per second.
+    """
+    servo: NotRequired[Servo]
 
 
 class Import(TypedDict):
