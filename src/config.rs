@@ -219,11 +219,11 @@ config_section! {
     /// requests of ten seconds may come at once; further ones are answered 429 with
     /// `Retry-After`.
     RatesConfig as "rates" |_this| {
-        /// Requests with one token a second, those of ten seconds at once; then 429 with
-        /// `Retry-After`. All JSON Web Tokens of one subject count as one token.
+        /// Requests per second with one token; then 429 with `Retry-After`. The requests of ten
+        /// seconds may come at once. All JSON Web Tokens of one subject count as one token.
         token_per_s: u32 = 2000, 1..=1_000_000;
-        /// The same of one address, for requests without a token and with one that was not used
-        /// in the last 5 s.
+        /// The same for the requests of one address without a token, or with one that was not
+        /// used in the last 5 s.
         address_per_s: u32 = 500, 1..=1_000_000;
     }
 }

@@ -36,14 +36,10 @@ use super::{RETRY_INTERVAL, SEND_TIMEOUT};
 use offbd_http::MessageOutcome;
 use offbd_net::Reasons;
 use offbd_service::Service;
-use offbd_wire::bus::{DeviceTopic, TopicStyle};
+use offbd_wire::bus::{DeviceTopic, PresenceWord, TopicStyle};
 use offbd_wire::mapping::Mapping;
 
 const BUS: &str = "mqtt";
-
-/// What the service says of itself, as devices do.
-const ONLINE: &str = "online";
-const OFFLINE: &str = "offline";
 
 /// Interval of MQTT's own signs of life, seconds.
 const KEEP_ALIVE_S: u16 = 20;
@@ -139,7 +135,12 @@ fn options(settings: &MqttSettings, shortened: Shortened) -> Result<MqttOptions,
     options.set_clean_session(false);
     if settings.state {
         let state = TopicStyle::Mqtt.service_state(client_id);
-        options.set_last_will(LastWill::new(state, OFFLINE, QoS::AtLeastOnce, true));
+        options.set_last_will(LastWill::new(
+            state,
+            PresenceWord::Offline.as_str(),
+            QoS::AtLeastOnce,
+            true,
+        ));
     }
     options.set_ack_mode(AckMode::Manual);
     options.set_max_packet_size(shortened.limit(), PROTOCOL_LENGTH);
@@ -300,7 +301,7 @@ impl Broker<'_> {
                 connection.renew.cancel();
             }
         }
-        connection.say(ONLINE);
+        connection.say(PresenceWord::Online);
         self.connected.send_replace(Some(connection.link.clone()));
     }
 
@@ -410,11 +411,11 @@ impl MqttConnection {
 
     /// Says whether the service is connected. At QoS 0: an acknowledgement of QoS 1 is that of a
     /// fault.
-    fn say(&self, state: &'static str) {
+    fn say(&self, state: PresenceWord) {
         if let Some(topic) = &self.state {
             let options = PublishOptions::at_most_once().retained();
             // It fails only when the connection has ended, or much waits to be sent.
-            let _ = self.client.try_publish(topic.as_str(), state, options);
+            let _ = self.client.try_publish(topic.as_str(), state.as_str(), options);
         }
     }
 
@@ -487,7 +488,7 @@ impl Answering for Arc<MqttConnection> {
     }
 
     async fn finish(&self) {
-        self.say(OFFLINE);
+        self.say(PresenceWord::Offline);
         self.end();
     }
 }

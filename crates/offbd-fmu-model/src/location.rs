@@ -13,9 +13,9 @@ use crate::instance::Refusal;
 /// [`Refusal::Location`] with the URI and what is wrong with it.
 pub fn path_of_location(uri: &str) -> Result<PathBuf, Refusal> {
     let refused = |why| Refusal::Location { uri: uri.to_owned(), why };
-    let Some((scheme, rest)) = uri.split_once(':') else { return Err(refused("is no URI")) };
+    let Some((scheme, rest)) = uri.split_once(':') else { return Err(refused("is not a URI")) };
     if !scheme.eq_ignore_ascii_case("file") {
-        return Err(refused("is no file"));
+        return Err(refused("is not the address of a file"));
     }
     let path = match rest.strip_prefix("//") {
         None => rest,
@@ -56,8 +56,8 @@ mod tests {
     #[test]
     fn another_location_is_refused_in_words() {
         let refused = |uri: &str| path_of_location(uri).unwrap_err().to_string();
-        assert_eq!(refused("/tmp"), "the location of the resources, /tmp, is no URI");
-        assert!(refused("https://example.com/a").ends_with("is no file"));
+        assert_eq!(refused("/tmp"), "the location of the resources, /tmp, is not a URI");
+        assert!(refused("https://example.com/a").ends_with("is not the address of a file"));
         assert!(refused("file://server/share").ends_with("is not on this computer"));
         assert!(refused("file:relative").ends_with("is not on this computer"));
         assert!(refused("file:///%ff").ends_with("is not UTF-8"));

@@ -20,7 +20,7 @@ pub(crate) type LogFormat =
 /// `fmi3LogMessageCallback`.
 pub(crate) type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
-/// The function by which an importer is told of a refusal.
+/// The function of the importer that receives the reason of a refusal.
 pub(crate) enum Logger {
     /// Of FMI 2.0, with the name of the instance.
     Format(LogFormat, CString),

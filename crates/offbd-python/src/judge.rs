@@ -253,8 +253,8 @@ impl NativeEngine {
     }
 }
 
-/// Calibrates a rig from healthy recordings, each run of a file a session of its own; returns its
-/// asset file with the calibration. `made_at` is the time of the calibration, RFC 3339.
+/// Calibrates a rig from healthy recordings; each run in a file counts as a session. Returns the
+/// asset file of the rig with the calibration. `made_at` is the time of the calibration, RFC 3339.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,

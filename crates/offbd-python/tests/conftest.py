@@ -75,14 +75,10 @@ class Service:
         self.process.stderr.close()
 
 
-class Peer:
-    """Answers the next requests itself, each with the bytes of a list, or with silence if they
-    are None, and passes later ones on to the service."""
+class Listener:
+    """Serves each connection to a port of its own."""
 
-    def __init__(self, service: Service | None = None) -> None:
-        self.service = service
-        self.answers: list[bytes | None] = []
-        self.silent: list[socket.socket] = []
+    def __init__(self) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))
         threading.Thread(target=self.accept, daemon=True).start()
 
@@ -96,11 +92,28 @@ class Peer:
                 connection, _ = self.listener.accept()
             except OSError:
                 return
-            try:
-                if self.is_answered(connection):
-                    connection.close()
-            except OSError:
-                connection.close()  # a client that has given up
+            self.serve(connection)
+
+    def serve(self, connection: socket.socket) -> None:
+        raise NotImplementedError
+
+
+class Peer(Listener):
+    """Answers the next requests itself, each with the bytes of a list, or with silence if they
+    are None, and passes later ones on to the service."""
+
+    def __init__(self, service: Service | None = None) -> None:
+        self.service = service
+        self.answers: list[bytes | None] = []
+        self.silent: list[socket.socket] = []
+        super().__init__()
+
+    def serve(self, connection: socket.socket) -> None:
+        try:
+            if self.is_answered(connection):
+                connection.close()
+        except OSError:
+            connection.close()  # a client that has given up
 
     def is_answered(self, connection: socket.socket) -> bool:
         request = read_request(connection)

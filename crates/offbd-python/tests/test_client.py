@@ -12,12 +12,12 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from conftest import Peer, Service, answered, as_last, problem, read_all, read_request
+from conftest import Listener, Peer, Service, answered, as_last, problem, read_all, read_request
 
 import offbd
 
 
-class LossyProxy:
+class LossyProxy(Listener):
     """Passes connections on. Of every ten, one is closed before the request, one after it:
     then the service has stored the batch, but the client does not know."""
 
@@ -25,22 +25,12 @@ class LossyProxy:
         self.service = service
         self.random = random.Random(1)
         self.n_lost = 0
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        threading.Thread(target=self.accept, daemon=True).start()
-
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
-
-    def accept(self) -> None:
-        while True:
-            try:
-                connection, _ = self.listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self.serve, args=(connection,), daemon=True).start()
+        super().__init__()
 
     def serve(self, connection: socket.socket) -> None:
+        threading.Thread(target=self.pass_on, args=(connection,), daemon=True).start()
+
+    def pass_on(self, connection: socket.socket) -> None:
         fate = self.random.randrange(10)
         host, port = self.service.listen.rsplit(":", 1)
         with connection:
@@ -63,7 +53,7 @@ class LossyProxy:
                 pass
 
 
-class Relay:
+class Relay(Listener):
     """Passes connections on as they are, counts them, and notes who ends them."""
 
     def __init__(self, service: Service) -> None:
@@ -72,8 +62,7 @@ class Relay:
         self.ended: list[str] = []
         self.open: list[socket.socket] = []
         self.threads: list[threading.Thread] = []
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        threading.Thread(target=self.accept, daemon=True).start()
+        super().__init__()
 
     def __enter__(self) -> Relay:
         return self
@@ -82,23 +71,14 @@ class Relay:
         self.listener.close()
         self.cut()
 
-    @property
-    def url(self) -> str:
-        return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
-
-    def accept(self) -> None:
-        while True:
-            try:
-                connection, _ = self.listener.accept()
-            except OSError:
-                return
-            self.n_connections += 1
-            host, port = self.service.listen.rsplit(":", 1)
-            upstream = socket.create_connection((host, int(port)))
-            self.open += [connection, upstream]
-            for ends in (("client", connection, upstream), ("service", upstream, connection)):
-                self.threads.append(threading.Thread(target=self.copy, args=ends))
-                self.threads[-1].start()
+    def serve(self, connection: socket.socket) -> None:
+        self.n_connections += 1
+        host, port = self.service.listen.rsplit(":", 1)
+        upstream = socket.create_connection((host, int(port)))
+        self.open += [connection, upstream]
+        for ends in (("client", connection, upstream), ("service", upstream, connection)):
+            self.threads.append(threading.Thread(target=self.copy, args=ends))
+            self.threads[-1].start()
 
     def copy(self, name: str, source: socket.socket, to: socket.socket) -> None:
         try:

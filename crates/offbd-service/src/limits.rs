@@ -15,8 +15,6 @@ pub struct OutOfRange {
 /// A key of the configuration whose value is a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NumberKey {
-    /// The key within its section.
-    pub name: &'static str,
     /// Section and name, `limits.assets`.
     pub path: &'static str,
     pub value: u64,
@@ -74,7 +72,6 @@ macro_rules! config_section {
                 vec![$({
                     let range: ::std::ops::RangeInclusive<$type> = $range;
                     $crate::NumberKey {
-                        name: stringify!($key),
                         path: concat!($section, ".", stringify!($key)),
                         value: $this.$key as u64,
                         least: *range.start() as u64,

@@ -199,6 +199,14 @@ pub enum PresenceWord {
 }
 
 impl PresenceWord {
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Online => "online",
+            Self::Offline => "offline",
+        }
+    }
+
     /// Returns the word that `payload` is; `None` for anything else.
     #[must_use]
     pub fn of_bytes(payload: &[u8]) -> Option<Self> {

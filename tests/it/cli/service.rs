@@ -24,6 +24,21 @@ fn check_prints_each_value_with_its_source() {
     assert_eq!((&data["value"], &data["source"]), (&"elsewhere".into(), &"again.toml".into()));
 }
 
+#[cfg(unix)]
+#[test]
+fn check_warns_of_a_password_that_everybody_can_read() {
+    use std::os::unix::fs::PermissionsExt;
+    let cli = CliFixture::new();
+    cli.write("offbd.toml", "database = 'postgres://u:hunter2@h/d'\n");
+    for (mode, is_told) in [(0o644, true), (0o640, false)] {
+        std::fs::set_permissions(cli.path("offbd.toml"), std::fs::Permissions::from_mode(mode))
+            .unwrap();
+        let stdout = cli.ok("check --config offbd.toml").stdout;
+        let told = stdout.contains("every user of this machine can read offbd.toml");
+        assert!(told == is_told && !stdout.contains("hunter2"), "{mode:o}: {stdout}");
+    }
+}
+
 #[test]
 fn an_invalid_configuration_is_rejected_with_the_key() {
     let cli = CliFixture::new();

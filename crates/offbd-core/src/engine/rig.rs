@@ -186,37 +186,21 @@ impl Setup {
     pub fn new(rig: Rig, profile: Option<Profile>) -> Result<Self, Invalid> {
         rig.check()?;
         let settings = rig.settings(profile.unwrap_or(rig.diagnostics.profile))?;
-        let mut twin = TwinModel::new(rig.ladder(settings.profile), nominal_axis(&rig)?);
+        let nominal = TwinAxis::new(rig.servo_model()?, rig.servo.dead_time_s);
+        let mut twin = TwinModel::new(rig.ladder(settings.profile), nominal);
         for axis in Axis::ALL {
             let learnt = rig.calibration.as_ref().and_then(|c| c.axes[axis]);
             if let Some(learnt) = learnt {
+                let (limit, rate) = (rig.servo.angle_limit_rad, rig.servo.rate_limit_rad_s);
+                let servo = ServoModel::new(limit, learnt.lag_s, rate)?;
                 twin.axes[axis] = TwinAxis {
-                    servo: ServoModel::new(
-                        rig.servo.angle_limit_rad,
-                        learnt.lag_s,
-                        rig.servo.rate_limit_rad_s,
-                    )?,
-                    dead_time_s: learnt.dead_time_s,
-                    command_gain: 1.0,
                     gain: learnt.gain,
                     level_rad: learnt.level_rad,
                     resistance_m_s2: learnt.resistance_m_s2,
+                    ..TwinAxis::new(servo, learnt.dead_time_s)
                 };
             }
         }
         Ok(Self { rig, settings, twin })
     }
-}
-
-/// The parameters of both axes before anything is learnt.
-fn nominal_axis(rig: &Rig) -> Result<TwinAxis, Invalid> {
-    let (servo, dead_time_s) = (rig.servo_model()?, rig.servo.dead_time_s);
-    Ok(TwinAxis {
-        servo,
-        dead_time_s,
-        command_gain: 1.0,
-        gain: 1.0,
-        level_rad: 0.0,
-        resistance_m_s2: 0.0,
-    })
 }

@@ -55,6 +55,16 @@ pub struct TwinAxis {
     pub resistance_m_s2: f64,
 }
 
+impl TwinAxis {
+    /// An axis as the asset file states it: level, without resistance, and with gains of 1. The
+    /// dead time is in s.
+    #[must_use]
+    pub const fn new(servo: ServoModel, dead_time_s: f64) -> Self {
+        let (command_gain, gain, level_rad, resistance_m_s2) = (1.0, 1.0, 0.0, 0.0);
+        Self { servo, dead_time_s, command_gain, gain, level_rad, resistance_m_s2 }
+    }
+}
+
 /// Speed from which on rolling resistance acts fully, m/s; proportional below. Chosen: a
 /// slower ball alternately sticks and rolls.
 const FULL_RESISTANCE_M_S: f64 = 0.01;
@@ -343,14 +353,7 @@ mod tests {
 
     fn twin(dead_time_s: f64, lag_s: f64) -> Twin {
         let servo = ServoModel::new(0.2, lag_s, 100.0).unwrap();
-        let axis = TwinAxis {
-            servo,
-            dead_time_s,
-            command_gain: 1.0,
-            gain: 1.0,
-            level_rad: 0.0,
-            resistance_m_s2: 0.0,
-        };
+        let axis = TwinAxis::new(servo, dead_time_s);
         // Zero accuracy: compared with the rolling ball, nothing may be neglected.
         let ladder = Ladder::new(&Ball::default(), &Plate::default(), 0.6, 0.0);
         Twin::new(TwinModel::new(ladder, axis))

@@ -1,7 +1,7 @@
 //! Examples of bodies.
 //!
-//! An example is for every JSON body with its schema. A page without an example of its own has one
-//! item.
+//! All JSON bodies with the same schema have the same example. A page without an example shows
+//! the example of one item.
 
 use std::collections::BTreeMap;
 

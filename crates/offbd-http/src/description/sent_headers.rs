@@ -1,6 +1,7 @@
 //! The response headers that clients read, described where they are sent.
 //!
-//! A handler names those of its own; those of every response with a certain status are added.
+//! A handler names the headers that it sends itself. Headers that every response with a certain
+//! status has are added here.
 
 use axum::http::StatusCode;
 use utoipa::openapi::header::{Header, HeaderBuilder};

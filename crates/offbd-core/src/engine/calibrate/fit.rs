@@ -372,8 +372,8 @@ impl Fitter<'_> {
     ) -> Option<TwinModel> {
         let spec = &self.rig.servo;
         let servo = ServoModel::new(spec.angle_limit_rad, lag_s, spec.rate_limit_rad_s).ok()?;
-        let axis =
-            TwinAxis { servo, dead_time_s, command_gain: 1.0, gain, level_rad, resistance_m_s2 };
+        let nominal = TwinAxis::new(servo, dead_time_s);
+        let axis = TwinAxis { gain, level_rad, resistance_m_s2, ..nominal };
         Some(TwinModel::new(self.rig.ladder(Profile::Default), axis))
     }
 }

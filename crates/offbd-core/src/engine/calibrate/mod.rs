@@ -419,14 +419,7 @@ pub(in crate::engine) mod tests {
     pub(in crate::engine) fn session(seconds: f64, amplitude: f64, gain: f64) -> Vec<Sample> {
         let rig = Rig::chapter("a");
         let servo = ServoModel::new(0.2, 0.05, 100.0).unwrap();
-        let axis = TwinAxis {
-            servo,
-            dead_time_s: 0.06,
-            command_gain: 1.0,
-            gain,
-            level_rad: 0.01,
-            resistance_m_s2: 0.0,
-        };
+        let axis = TwinAxis { gain, level_rad: 0.01, ..TwinAxis::new(servo, 0.06) };
         let mut twin = Twin::new(TwinModel::new(rig.ladder(Profile::Default), axis));
         let times: Vec<f64> = (0..(seconds / 0.01) as u32).map(|i| f64::from(i) * 0.01).collect();
         // The level is compensated, as by a controller.
