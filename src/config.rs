@@ -27,7 +27,7 @@ mod bus;
 mod cluster;
 mod effective;
 #[cfg(test)]
-mod manual;
+pub(crate) mod manual;
 mod secrets;
 
 use std::net::{IpAddr, SocketAddr};

@@ -85,7 +85,7 @@ pub struct Server {
     store: Store,
     workers: Workers,
     /// The lock file of an SQLite database, locked until the store is closed. `None` for
-    /// PostgreSQL, which has a lock of its own.
+    /// PostgreSQL, which has its own lock.
     lock: Option<File>,
 }
 

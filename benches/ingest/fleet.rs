@@ -27,7 +27,7 @@ const KILL_EVERY: Duration = Duration::from_secs(60);
 const DOWN_FOR: Duration = Duration::from_secs(5);
 
 /// Requests under way at a time. So many that those for rigs that are being loaded do not hold
-/// up the others: each rig has a connection of its own in reality.
+/// up the others: each rig has its own connection in reality.
 const CONNECTIONS: usize = 2000;
 
 /// Silence after which the data of a rig count as lost, s: longer than from one batch to the next.

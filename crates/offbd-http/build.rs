@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What the page is made of; a change of anything else builds nothing anew.
+/// What the page is made of; a change of anything else rebuilds nothing.
 const SOURCES: [&str; 7] = [
     "../../web/src",
     "../../web/public",

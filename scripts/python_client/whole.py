@@ -49,7 +49,7 @@ def main():
     ]
     # The name of a builtin of Python gets an underscore.
     wrong += [f"no model {name}" for name in objects if not models & {name, f"{name}Model", f"{name}_"}]
-    # A model without a name of its own was repeated inside another one.
+    # A model without its own name was repeated inside another one.
     wrong += [f"a nameless model {name}" for name in models if name.endswith("Item")]
     output = pathlib.Path(printed).read_text()
     warnings = re.findall(r"Unsupported content type \S+|Cannot [^\n]*|Unable [^\n]*", output)

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 use serde_json::json;
 
@@ -15,11 +16,14 @@ use offbd_terminal::output::{self, OutputFormat};
 /// For a PostgreSQL database, use pg_dump instead.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    offbd backup --data /var/lib/offbd /backup/offbd-monday.sqlite")]
+    offbd backup --data /var/lib/offbd -o /backup/offbd-monday.sqlite")]
 pub(super) struct BackupArgs {
     /// The file to create; it must not exist
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
+    #[arg(value_name = "FILE", required_unless_present = "output")]
+    file: Option<PathBuf>,
+    /// The file to create, as with the other commands
+    #[arg(short, long, value_name = "FILE", conflicts_with = "file")]
+    output: Option<PathBuf>,
     #[command(flatten)]
     config: ConfigArgs,
     /// Text for people, or one JSON object
@@ -50,8 +54,10 @@ pub(super) struct RestoreArgs {
 
 pub(super) fn backup(args: &BackupArgs) -> anyhow::Result<()> {
     let config = args.config.load()?;
-    offbd_terminal::block_on(server::back_up(&config, &args.file))?;
-    let (file, store) = (args.file.display().to_string(), config.location()?.to_string());
+    // One of them is required.
+    let file = args.output.as_ref().or(args.file.as_ref()).context("no FILE")?;
+    offbd_terminal::block_on(server::back_up(&config, file))?;
+    let (file, store) = (file.display().to_string(), config.location()?.to_string());
     match args.format {
         OutputFormat::Table => output::print_line(&format!("{file}: a copy of {store}")),
         OutputFormat::Json => output::print_json(&json!({ "store": store, "file": file })),

@@ -1,13 +1,14 @@
 //! The help of the program: its commands grouped by what one does with them.
 
 use clap::Command;
+use offbd_terminal::help::{self, HELP};
 use offbd_terminal::table::wrapped;
 
 /// The groups of commands, and the order in which the help has them.
-const GROUPS: [(&str, &[&str]); 6] = [
+pub(super) const GROUPS: [(&str, &[&str]); 6] = [
     ("Try it", &["demo", "simulate"]),
     ("Look at recordings", &["inspect", "replay", "trends", "export"]),
-    ("Learn a rig", &["calibrate", "drive-cycle"]),
+    ("Calibrate a rig", &["calibrate", "drive-cycle"]),
     (
         "Run the service",
         &["serve", "forward", "watch", "check", "token", "backup", "restore", "migrate"],
@@ -15,9 +16,6 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Laboratory", &["scene", "chart", "score", "soak"]),
     ("Shell", &["completions", "man", "help"]),
 ];
-
-/// What clap itself adds.
-const HELP: (&str, &str) = ("help", "Prints the help of the program or of a command");
 
 /// Width of the names of commands, characters.
 const NAMES: usize = 12;
@@ -34,7 +32,7 @@ pub(super) fn grouped(mut command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{commands}\n{{all-args}}{{after-help}}"
     );
-    command.override_usage("offbd [OPTIONS] <COMMAND>").help_template(template)
+    help::described(command.override_usage("offbd [OPTIONS] <COMMAND>").help_template(template))
 }
 
 /// Returns the subcommands in their groups, each with what it does.
@@ -42,7 +40,7 @@ fn listed(command: &Command) -> String {
     let line = |name: &&str| {
         let about = command.find_subcommand(name).and_then(Command::get_about);
         let about = about.map(ToString::to_string);
-        let about = about.or_else(|| (*name == HELP.0).then(|| HELP.1.to_owned()))?;
+        let about = about.or_else(|| (*name == "help").then(|| HELP.to_owned()))?;
         Some(wrapped(&format!("  {name:NAMES$} "), &about) + "\n")
     };
     let group = |(title, names): &(&str, &[&str])| {

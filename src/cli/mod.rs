@@ -11,6 +11,8 @@ mod completions;
 mod demo;
 mod health;
 mod help;
+#[cfg(all(test, feature = "lab", feature = "nats"))]
+mod reference;
 mod serve;
 mod token;
 mod usage;
@@ -22,6 +24,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use offbd_file_cli::{calibrate, drive_cycle, export, inspect, replay, trends};
 use offbd_forward::command as forward;
+use offbd_store::StoreError;
 use offbd_terminal::logging::LoggingArgs;
 use offbd_terminal::output;
 
@@ -89,12 +92,16 @@ pub fn main() -> ExitCode {
     end_with_essential_threads();
     match parse() {
         Ok(cli) => {
-            let report =
-                |error: anyhow::Error| offbd_terminal::report(&error, error.is::<ConfigError>());
+            let report = |error: anyhow::Error| offbd_terminal::report(&error, is_unusable(&error));
             run(cli).map_or_else(report, |()| ExitCode::SUCCESS)
         }
         Err(error) => usage::print(error),
     }
+}
+
+/// Whether the configuration, or the store that it names, stays unusable for this program.
+fn is_unusable(error: &anyhow::Error) -> bool {
+    error.is::<ConfigError>() || error.downcast_ref().is_some_and(StoreError::is_newer)
 }
 
 /// Parses the arguments of this process.

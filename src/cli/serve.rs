@@ -88,9 +88,9 @@ pub(super) struct MigrateArgs {
     offbd check --config offbd.toml --print\n  \
     offbd check --data /var/lib/offbd\n  \
     offbd check --health\n\n\
-    Exit status: 0 valid, 3 invalid configuration; the error names the key;\n\
-    1 damaged store, of which each finding is printed, or a service that is not\n\
-    ready.")]
+    Exit status: 0 valid, 3 invalid configuration; the error names the key, or the\n\
+    store of a newer version; 1 damaged store, of which each finding is printed, or\n\
+    a service that is not ready.")]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     config: ConfigArgs,

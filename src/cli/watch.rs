@@ -28,8 +28,8 @@ use offbd_wire::verdict::{AxisEvidenceView, FaultView};
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     offbd watch demo-rig\n  \
-    offbd watch bench-1 --address 192.168.1.5:8087 --hz 1\n  \
-    offbd watch bench-1 --address https://rigs.example --token-file token\n  \
+    offbd watch bench-1 --url 192.168.1.5:8087 --hz 1\n  \
+    offbd watch bench-1 --url https://rigs.example --token-file token\n  \
     offbd watch bench-1 --states 1 --format json | jq .evidence")]
 pub(super) struct WatchArgs {
     /// Name of the asset

@@ -80,7 +80,7 @@ section! {
         /// there.
         #[serde(default)]
         pub state: bool,
-        /// A mapping file, for devices with topics and formats of their own.
+        /// A mapping file, for devices with their own topics and formats.
         pub mapping: Option<PathBuf>,
     }
 }
@@ -131,8 +131,8 @@ impl NatsConfig {
         if !self.url.split(',').all(is_server) {
             return invalid(
                 "nats.url",
-                "is not `nats://HOST:PORT` or `tls://HOST:PORT`; user and password have keys of \
-                 their own",
+                "is not `nats://HOST:PORT` or `tls://HOST:PORT`; user and password have \
+                 their own keys",
             );
         }
         let is_monitor = |url: &str| url.trim().starts_with("http://");
@@ -233,7 +233,7 @@ impl MqttConfig {
     /// [`ConfigError::Invalid`] if the URL is not that of a broker.
     pub fn address(&self) -> Result<BrokerAddress, ConfigError> {
         let reason = "is not `mqtt://HOST[:PORT]` or `mqtts://HOST[:PORT]`; user and password have \
-            keys of their own";
+            their own keys";
         let (rest, encrypted) =
             match (self.url.strip_prefix("mqtt://"), self.url.strip_prefix("mqtts://")) {
                 (Some(rest), _) => (rest, false),
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broker_knows_each_node_by_a_name_of_its_own() {
+    fn a_broker_knows_each_node_by_its_own_name() {
         let node = |name: &str| ClusterConfig {
             name: name.to_owned(),
             listen: ([127, 0, 0, 1], 0).into(),

@@ -227,7 +227,7 @@ fn read(toml: &str) -> Result<Config, config::ConfigError> {
 }
 
 /// Compares a file of the project with what it should be; with `UPDATE_MANUAL` it is written.
-fn compare(path: &str, expected: impl Fn(&str) -> String) {
+pub(crate) fn compare(path: &str, expected: impl Fn(&str) -> String) {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     let text = std::fs::read_to_string(&path).unwrap_or_default();
     let expected = expected(&text);

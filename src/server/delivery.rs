@@ -25,8 +25,8 @@ impl Senders {
 
     async fn attempt(&self, channel: &StoredChannel, message: &NotificationView) -> SendOutcome {
         match channel {
-            StoredChannel::Webhook { url, secret } => {
-                self.webhook.send((url, secret), message, Clock::System.now()).await
+            StoredChannel::Webhook { url, secret, format } => {
+                self.webhook.send((url, secret), *format, message, Clock::System.now()).await
             }
             #[cfg(feature = "email")]
             StoredChannel::Email(mail) => email::send(mail, message, &self.settings.targets).await,

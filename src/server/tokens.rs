@@ -103,7 +103,7 @@ pub async fn revoke_token(config: &Config, name_or_id: &str) -> Result<()> {
         Some(row) => Some(row),
         None => store.token(name_or_id).await?.filter(|row| row.revoked_at.is_none()),
     };
-    let Some(row) = found else { bail!("no token `{name_or_id}` is in force") };
+    let Some(row) = found else { bail!("no valid token `{name_or_id}`") };
     let change = AccessWrite::RevokeToken { id: row.id.clone(), at: Clock::System.now() };
     write(writer, change, "revoke_token", &row.id).await
 }

@@ -1,7 +1,7 @@
 //! Traces for OpenTelemetry: the spans of each request, sent to a collector by OTLP over
 //! HTTP. Inactive without an endpoint.
 //!
-//! At most 2048 spans are queued in memory; a thread of its own sends them. While the
+//! At most 2048 spans are queued in memory; a separate thread sends them. While the
 //! collector is unavailable, further spans are dropped, so that the service never waits
 //! for it.
 

@@ -536,7 +536,7 @@ def refusals(fmu):
 def refused_exports():
     (DATA / "no.so").write_text("#!/bin/sh\n")
     reason = offbd("export", "fmu", "--library", "no.so", "-o", "no.fmu", status=3).stderr
-    assert "no.so: is no shared library" in reason, reason
+    assert "no.so: is not a shared library" in reason, reason
     assert not (DATA / "no.fmu").exists()
     twice = ["--library", LIBRARY] * 2
     reason = offbd("export", "fmu", *twice, "-o", "no.fmu", status=3).stderr

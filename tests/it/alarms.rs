@@ -1,6 +1,8 @@
 //! The alarms of the fleet: faults, lost communication, mutes, and what to do.
 
-use crate::support::{Client, Events, ServiceFixture, eventually, hours_from_now, rig};
+use crate::support::{
+    Client, Events, ServiceFixture, eventually, hours_from_now, registration, rig,
+};
 use serde_json::{Value, json};
 
 async fn alarms(client: &Client, query: &str) -> Vec<Value> {
@@ -86,6 +88,65 @@ async fn a_failure_of_an_earlier_session_is_not_tested_in_a_new_one() {
     client.telemetry("bench", Some("new"), &rig(20, 6000)).await;
     assert_eq!(told().await, [(json!(true), json!(false)), (json!(true), json!(false))]);
     assert_eq!(open().await, true);
+}
+
+/// Without a calibration, a fault of a servo is suspected only.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn suspected_faults_are_not_among_the_failing_ones() {
+    let fixture = with_faults().await;
+    let client = &fixture.client;
+    let mut unlearnt = registration("suspect");
+    unlearnt.as_object_mut().unwrap().remove("calibration");
+    client.post("assets", &unlearnt).await.expect(201);
+    client.telemetry("suspect", Some("sick"), &rig(2000, 300)).await;
+    let suspected = alarms(client, "?state=suspected&code=x_servo").await;
+    assert_eq!(keys(&suspected), [("suspect".to_owned(), "x_servo".to_owned())]);
+    let told = (&suspected[0]["status"], &suspected[0]["failing"]);
+    assert_eq!(told, (&json!("pending"), &json!(true)));
+    let failing = alarms(client, "?state=failing&code=x_servo").await;
+    assert_eq!(keys(&failing), [("failing".to_owned(), "x_servo".to_owned())]);
+    assert_eq!(alarms(client, "?state=active&code=x_servo").await.len(), 3);
+}
+
+/// What failed when its data stopped is not known to fail now.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_alarms_and_faults_of_a_silent_rig_tell_since_when_it_is_silent() {
+    let fixture = ServiceFixture::start_with(|config| {
+        config.communication.lost_after_s = 1;
+        config.communication.back_after_s = 0;
+    })
+    .await;
+    let client = &fixture.client;
+    for asset in ["a", "b"] {
+        client.asset(asset).await;
+    }
+    let samples = rig(9000, 300);
+    client.telemetry("b", Some("s"), &rig(2000, 300)).await;
+    client.end("b", "s").await;
+    client.telemetry("a", Some("s"), &samples[..2000]).await;
+    let path = "assets/a/faults";
+    let told = async || {
+        let alarm = alarms(client, "?asset=a&code=x_servo").await.remove(0);
+        let fault = client.get(&format!("{path}/x_servo")).await.expect(200);
+        let listed = client.get(path).await.expect(200)["items"].clone();
+        let listed = listed.as_array().unwrap().iter().find(|f| f["code"] == "x_servo").unwrap();
+        [&alarm, &fault, listed].map(|told| told["communication_lost_since"].clone())
+    };
+    let silent = "?asset=a&code=communication_lost&state=failing";
+    let lost = eventually(async || alarms(client, silent).await.pop()).await;
+    assert_eq!(lost["since"], lost["communication_lost_since"]);
+    assert_eq!(told().await, [&lost["since"]; 3].map(Value::clone));
+    let ended = alarms(client, "?asset=b&code=x_servo").await.remove(0);
+    assert_eq!(ended["communication_lost_since"], Value::Null);
+    // One batch may be followed by the next silence before anybody looks.
+    let sent = std::cell::Cell::new(2000);
+    eventually(async || {
+        let next = (sent.get() + 10).min(samples.len());
+        client.telemetry("a", Some("s"), &samples[sent.replace(next)..next]).await;
+        let again = told().await;
+        again.iter().all(|since| *since != lost["since"]).then_some(())
+    })
+    .await;
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -204,7 +265,7 @@ async fn a_rig_that_falls_silent_is_an_alarm_until_its_data_are_back() {
     let wanted = json!({ "alarms": [{ "asset": "a", "code": "communication_lost" }] });
     let answer = client.post("alarms/acknowledge?by=ann", &wanted).await.expect(200);
     assert_eq!(answer["items"][0]["acknowledged"], true, "{answer}");
-    // It is known after a restart, and is no second event.
+    // It is known after a restart, and is not a second event.
     fixture.restart().await;
     let client = fixture.client.clone();
     let fleet = client.get("fleet").await.expect(200);

@@ -1,8 +1,11 @@
 //! Rules of `ARCHITECTURE.md` that the compiler does not check: names that some folders must not
 //! use, and that documents name only existing paths and headings.
 
+mod blocks;
 mod bounds;
+mod changes;
 mod documents;
+mod english;
 mod links;
 
 use std::collections::BTreeMap;
@@ -164,6 +167,13 @@ fn what_the_image_is_built_from_is_sent_to_the_builder() {
         }
     }
     assert!(n_copied > 5);
+}
+
+#[test]
+fn the_image_asks_the_service_whether_it_is_ready() {
+    let image = std::fs::read_to_string(Path::new(ROOT).join("Dockerfile")).unwrap();
+    let check = image.lines().find(|line| line.starts_with("HEALTHCHECK ")).unwrap();
+    assert!(check.ends_with(r#" CMD ["offbd", "check", "--health"]"#), "{check}");
 }
 
 /// Returns the Rust source files below `folder`, relative to the root.

@@ -143,7 +143,7 @@ async fn a_server_that_is_connected_to_later_is_checked() {
 
 /// Without a broker the service starts, and connects when there is one.
 #[tokio::test(flavor = "multi_thread")]
-async fn a_broker_that_is_away_is_waited_for() {
+async fn the_service_waits_for_a_broker_that_is_away() {
     let (mut nats, mut mosquitto) = (Nats::start(), Mosquitto::start());
     nats.kill();
     mosquitto.kill();

@@ -1,4 +1,5 @@
-//! Compressed request bodies: gzip and zstd, within the limits of plain bodies.
+//! Compressed request bodies: gzip and zstd, within the limits of plain bodies. Those of the agent
+//! are in `forward/coding.rs`.
 
 use std::io::{self, Read, Write};
 
@@ -6,7 +7,7 @@ use crate::support::{Answer, Client, ServiceFixture, batch, csv, packed, rig};
 use reqwest::Method;
 use serde_json::{Value, json};
 
-const CODINGS: [&str; 2] = ["gzip", "zstd"];
+pub(crate) const CODINGS: [&str; 2] = ["gzip", "zstd"];
 
 /// Limit of a batch and of an import in these tests, bytes.
 const LIMIT: usize = 1 << 20;
@@ -26,11 +27,17 @@ fn zstd(mut plain: impl Read, log: u32) -> Vec<u8> {
     encoder.finish().unwrap()
 }
 
-fn compressed(coding: &str, plain: impl Read) -> Vec<u8> {
+pub(crate) fn compressed(coding: &str, plain: impl Read) -> Vec<u8> {
     if coding == "gzip" { gzip(plain) } else { zstd(plain, 20) }
 }
 
-async fn post(client: &Client, path: &str, kind: &str, coding: &str, body: Vec<u8>) -> Answer {
+pub(crate) async fn post(
+    client: &Client,
+    path: &str,
+    kind: &str,
+    coding: &str,
+    body: Vec<u8>,
+) -> Answer {
     let request = client.request(Method::POST, path).header("content-type", kind);
     client.send(request.header("content-encoding", coding).body(body)).await
 }

@@ -65,7 +65,7 @@ async fn a_damaged_recording_is_not_served() {
         set_data(&mut db, first_index, &changed).await;
         assert_eq!(exports().await, [true, true], "bit {bit} of {} bytes", data.len());
     }
-    // A replay names the damage, and is no verdict on a part.
+    // A replay names the damage, and is not a verdict on a part.
     let replay = client.post(&format!("sessions/{id}/replays"), &json!({})).await.expect(202);
     let replay_path = format!("replays/{}", replay["id"].as_str().unwrap());
     let done = eventually(async || {

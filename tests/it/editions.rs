@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::support::{Answer, Client, ServiceFixture};
+use crate::support::{Answer, Client, ServiceFixture, hours_from_now};
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, TestRunner};
 use reqwest::Method;
@@ -141,6 +141,104 @@ async fn what_somebody_has_changed_is_not_deleted_unseen() {
     client.get("assets/a").await.problem(404);
 }
 
+/// The owner's notes and the mutes of monitors have their entity tags in lists.
+#[tokio::test]
+async fn notes_and_mutes_are_not_overwritten_unseen() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.put("assets/a", &rig(0, "")).await.expect(201);
+    let note = |n: usize| json!({ "text": format!("note {n}") });
+    let mute = |n: usize| json!({ "reason": format!("{n}"), "until": hours_from_now(1) });
+    let create = async |path: &str, body: &Value| {
+        let request = client.request(Method::PUT, path).json(body);
+        client.send(request.header("if-none-match", "*")).await
+    };
+    let listed = async |list: &str| client.get(list).await.json();
+    for (list, items, path, content) in [
+        ("advice", "notes", "advice/x_servo/note", &note as &dyn Fn(usize) -> Value),
+        ("assets/a/mutes", "items", "assets/a/mutes/x_servo", &mute as &dyn Fn(usize) -> Value),
+    ] {
+        let present = async || listed(list).await[items].clone();
+        let refused = send(client, Method::PUT, path, &content(0), "*").await;
+        assert_eq!(refused.problem(412)["etag"], Value::Null, "{path}");
+        assert_eq!(present().await, json!([]));
+        let first = create(path, &content(0)).await;
+        first.expect(200);
+        let read = tag(&first);
+        assert_eq!(present().await[0]["etag"], read, "{path}");
+        // Who thinks that there is none gets the tag of the one there is.
+        assert_eq!(create(path, &content(1)).await.problem(412)["etag"], read, "{path}");
+        let second = send(client, Method::PUT, path, &content(1), &read).await;
+        second.expect(200);
+        let refused = send(client, Method::PUT, path, &content(2), &read).await;
+        assert_eq!(refused.problem(412)["etag"], tag(&second), "{path}");
+        assert_eq!(present().await[0]["etag"], tag(&second), "{path}");
+        // As ever without a condition.
+        client.put(path, &content(3)).await.expect(200);
+    }
+    let stale = send(client, Method::DELETE, "assets/a/mutes/x_servo", &Value::Null, "\"0\"").await;
+    let now = stale.problem(412)["etag"].as_str().unwrap().to_owned();
+    send(client, Method::DELETE, "assets/a/mutes/x_servo", &Value::Null, &now).await.expect(204);
+    assert_eq!(listed("assets/a/mutes").await["items"], json!([]));
+    create("assets/a", &rig(1, "")).await.problem(412);
+    // Conditions that are malformed or cannot hold.
+    for (matching, none_matching) in [(None, "\"x\""), (Some(""), "*"), (Some("\"x\""), "*")] {
+        let request = client.request(Method::PUT, "assets/a").json(&rig(1, ""));
+        let request = request.header("if-none-match", none_matching);
+        let request = match matching {
+            Some(matching) => request.header("if-match", matching),
+            None => request,
+        };
+        client.send(request).await.problem(400);
+    }
+}
+
+/// All have read the same edition, or none, and send at the same time.
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn exactly_one_of_many_simultaneous_notes_and_mutes_is_kept() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.put("assets/a", &rig(0, "")).await.expect(201);
+    for path in ["advice/x_servo/note", "assets/a/mutes/x_servo"] {
+        let mut read = None;
+        for round in 0..5 {
+            let editors: Vec<_> = (0..16)
+                .map(|n| {
+                    let body = match path.starts_with("advice") {
+                        true => json!({ "text": format!("{round} {n}") }),
+                        false => {
+                            json!({ "reason": format!("{round} {n}"), "until": hours_from_now(1) })
+                        }
+                    };
+                    let request = client.request(Method::PUT, path).json(&body);
+                    let request = match &read {
+                        Some(tag) => request.header("if-match", tag),
+                        None => request.header("if-none-match", "*"),
+                    };
+                    let client = client.clone();
+                    tokio::spawn(async move { client.send(request).await })
+                })
+                .collect();
+            let mut made = succeeded(editors).await;
+            assert_eq!(made.len(), 1, "{path}, round {round}");
+            read = made.pop();
+        }
+    }
+}
+
+/// The entity tags that the changes have made; the others are refused.
+async fn succeeded(editors: Vec<tokio::task::JoinHandle<Answer>>) -> Vec<String> {
+    let mut made = Vec::new();
+    for editor in editors {
+        let answer = editor.await.unwrap();
+        match answer.status.as_u16() {
+            200 => made.push(tag(&answer)),
+            _ => drop(answer.problem(412)),
+        }
+    }
+    made
+}
+
 /// All have read the same edition, and send at the same time.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn exactly_one_of_many_simultaneous_editors_succeeds() {
@@ -159,14 +257,7 @@ async fn exactly_one_of_many_simultaneous_editors_succeeds() {
                     })
                 })
                 .collect();
-            let mut made = Vec::new();
-            for editor in editors {
-                let answer = editor.await.unwrap();
-                match answer.status.as_u16() {
-                    200 => made.push(tag(&answer)),
-                    _ => drop(answer.problem(412)),
-                }
-            }
+            let made = succeeded(editors).await;
             assert_eq!(made, [tag(&client.get(&each.path).await)], "{each:?}");
         }
     }

@@ -1,5 +1,5 @@
-//! The examples in `openapi.yaml`: every body that a person writes has one, and each is as its
-//! schema says.
+//! The examples in `openapi.yaml`: every body that a person writes or reads has one, and each is as
+//! its schema says. Every operation has a description.
 
 use boon::{Compiler, Schemas};
 use serde_json::{Value, json};
@@ -46,19 +46,40 @@ fn contents(place: &str, body: &Value, document: &Value) -> Vec<ExampleBody> {
 }
 
 #[test]
-fn every_request_body_that_is_text_has_an_example() {
+fn every_body_that_is_text_has_an_example() {
     let document = openapi();
     let (requests, responses) = bodies(&document);
     let is_binary = |body: &ExampleBody| {
         let is_file =
             body.schema["$ref"].as_str().is_some_and(|name| name.ends_with("/BinaryFile"));
-        is_file || body.media_type == "application/msgpack"
+        is_file || ["application/msgpack", "multipart/form-data"].contains(&&*body.media_type)
     };
     let lacking = requests.iter().filter(|body| body.examples.is_empty() && !is_binary(body));
     let lacking: Vec<_> = lacking.map(|body| (&body.place, &body.media_type)).collect();
     assert!(requests.len() > 15 && lacking.is_empty(), "{lacking:?}");
-    let n_responses = responses.iter().filter(|body| !body.examples.is_empty()).count();
-    assert!(n_responses > 60, "{n_responses}");
+    let is_success = |body: &ExampleBody| {
+        body.place.rsplit_once(' ').is_some_and(|(_, status)| status.starts_with('2'))
+    };
+    let read = responses.iter().filter(|body| body.media_type == "application/json");
+    let (some, lacking): (Vec<_>, Vec<_>) =
+        read.filter(|body| is_success(body)).partition(|body| !body.examples.is_empty());
+    let lacking: Vec<_> = lacking.iter().map(|body| &body.place).collect();
+    assert!(some.len() > 60 && lacking.is_empty(), "{lacking:#?}");
+}
+
+#[test]
+fn every_operation_has_a_description_beside_its_summary() {
+    let document = openapi();
+    let is_empty = |text: &Value| text.as_str().is_none_or(str::is_empty);
+    let all: Vec<_> = operations(&document).collect();
+    let lacking: Vec<_> = all
+        .iter()
+        .filter(|(.., operation)| {
+            is_empty(&operation["summary"]) || is_empty(&operation["description"])
+        })
+        .map(|(method, path, _)| (method, path))
+        .collect();
+    assert!(all.len() > 90 && lacking.is_empty(), "{lacking:#?}");
 }
 
 #[test]

@@ -10,6 +10,18 @@ async fn fault(client: &Client, asset: &str, code: &str) -> Value {
     client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
 }
 
+#[tokio::test]
+async fn the_version_of_sovd_leads_to_the_rigs() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    let info = client.get("/sovd/version-info").await.expect(200);
+    let root = client.get(info["sovd_info"][0]["base_uri"].as_str().unwrap()).await.expect(200);
+    let components = client.get(root["components"].as_str().unwrap()).await.expect(200);
+    let rig = client.get(components["items"][0]["href"].as_str().unwrap()).await.expect(200);
+    assert_eq!(rig["id"], "a");
+}
+
 /// The adapter for SOVD names the recording of a fault as long as there is one.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_fault_of_sovd_refers_to_its_recording() {
@@ -136,7 +148,7 @@ async fn in_use_counts_are_updated_per_session_and_survive_clearing() {
     assert_eq!(ratio(&x), ([3, 1, 1], Some(1.0)));
     assert_eq!((&x["monitor"], &x["session_open"]), (&Value::Null, &json!(false)));
     let sensor = fault(&fixture.client, "a", "sensor").await;
-    assert_eq!(ratio(&sensor), ([3, 2, 2], Some(1.0)), "the sensor needs no ball");
+    assert_eq!(ratio(&sensor), ([3, 2, 1], Some(0.5)), "nobody may have put the ball down");
     fixture.client.delete("assets/a/faults/x_servo?by=ann").await.expect(204);
     fixture.restart().await;
     let x = fault(&fixture.client, "a", "x_servo").await;
@@ -194,7 +206,7 @@ async fn a_code_cleared_while_no_session_is_open_is_an_event() {
     let mut missed = Events::new(stream.unwrap());
     assert_eq!(missed.next().await, cleared);
     fixture.client.telemetry("a", Some("t"), &rig(2000, 300)).await;
-    assert_eq!(missed.next().await["session"], "t", "clearing a cleared code is no event");
+    assert_eq!(missed.next().await["session"], "t", "clearing a cleared code is not an event");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,6 +1,7 @@
 //! The edge agent `offbd forward`, as a process, between a device and the real service.
 
 mod answers;
+mod coding;
 mod damage;
 #[cfg(target_os = "linux")]
 mod failing_disk;
@@ -10,6 +11,7 @@ mod set_aside;
 #[cfg(unix)]
 mod stop;
 mod strangers;
+mod token;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

@@ -17,7 +17,7 @@ fn with_gaps() -> Vec<Sample> {
     kept.map(delayed).collect()
 }
 
-/// Spacings that are no gaps, and gaps, s.
+/// Spacings that are not gaps, and gaps, s.
 fn intervals(samples: &[Sample]) -> (Vec<f64>, Vec<f64>) {
     let steps = samples.windows(2).map(|pair| pair[1].t_s - pair[0].t_s);
     steps.partition(|step_s| *step_s <= 0.3)

@@ -60,6 +60,7 @@ mod support;
 mod tables;
 mod tags;
 #[cfg(feature = "otel")]
+#[cfg(feature = "otel")]
 mod traces;
 mod trends;
 mod trials;

@@ -54,7 +54,7 @@ fn shifted(samples: Vec<Sample>) -> Vec<Sample> {
 }
 
 #[tokio::test]
-async fn a_device_that_starts_anew_is_not_taken_for_its_own_past() {
+async fn a_device_that_starts_again_is_not_taken_for_its_own_past() {
     for numbered in [false, true] {
         for (n_first, n_idle) in [(7000, 0), (7000, 50), (3000, 50), (600, 1)] {
             let fixture = service().await;
@@ -162,7 +162,7 @@ async fn retransmissions_after_the_end_of_a_session_are_duplicates() {
     }
 }
 
-/// A device that starts anew sends again, late, what its first run has sent: older than what the
+/// A device that restarts sends again, late, what its first run has sent: older than what the
 /// engine of the second run remembers, and at times at which that has no sample.
 #[tokio::test]
 async fn retransmissions_of_an_earlier_run_are_duplicates_however_late() {
@@ -218,7 +218,7 @@ async fn conflicting_samples_are_rejected_by_name() {
         let take = |samples: Vec<Sample>| if numbered { samples } else { unnumbered(&samples) };
         let samples = take(rig(3000, usize::MAX));
         send(client, Some("s"), &samples).await;
-        // Another device with the same name, or the same device counting anew.
+        // Another device with the same name, or the same device counting again from zero.
         let other = take(shifted(rig(3000, usize::MAX)));
         assert_eq!(send(client, Some("s"), &other).await, [0, 0, 3000, 0]);
         let ack = client.telemetry("a", Some("s"), &other[7..8]).await;
@@ -245,7 +245,7 @@ async fn conflicting_samples_are_rejected_by_name() {
 }
 
 #[tokio::test]
-async fn a_rig_whose_rows_are_no_samples_is_not_tested_and_not_silent() {
+async fn a_rig_whose_rows_are_not_samples_is_not_tested_and_not_silent() {
     let data = tempfile::tempdir().unwrap();
     let Process { client, .. } = &Process::start(data.path());
     client.asset("a").await;
@@ -262,7 +262,7 @@ async fn a_rig_whose_rows_are_no_samples_is_not_tested_and_not_silent() {
     let untested = async |n: u64, seen_before: &Value| {
         let rig = fleet().await;
         assert_eq!(rig["unjudged"]["samples"], n, "{rig}");
-        assert!(rig["unjudged"]["reason"].as_str().unwrap().contains("no sample"), "{rig}");
+        assert!(rig["unjudged"]["reason"].as_str().unwrap().contains("not a sample"), "{rig}");
         assert!(rig["last_seen"].is_string() && rig["last_seen"] != *seen_before, "{rig}");
         rig["last_seen"].clone()
     };

@@ -751,7 +751,7 @@ async fn a_learnt_rig_has_a_drive_cycle() {
 
     client.post("assets", &json!({ "name": "new" })).await.expect(201);
     let problem = client.get("assets/new/drive-cycle").await.problem(409);
-    assert!(problem["detail"].as_str().unwrap().contains("not learnt"), "{problem}");
+    assert!(problem["detail"].as_str().unwrap().contains("not calibrated"), "{problem}");
     assert_eq!(problem["type"], "urn:offbd:problem:no-drive-cycle");
     client.get("assets/nobody/drive-cycle").await.problem(404);
 }

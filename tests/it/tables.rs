@@ -21,6 +21,10 @@ struct OddFile {
 /// The rows of a recording in which an x servo dies: time, commands, positions.
 fn rows(cli: &CliFixture) -> Vec<[Option<f64>; 5]> {
     cli.ok("simulate --seconds 30 --fault x_servo:dead@10 -o sick.csv");
+    read_rows(cli)
+}
+
+fn read_rows(cli: &CliFixture) -> Vec<[Option<f64>; 5]> {
     let text = cli.read("sick.csv");
     let cells = |line: &str| -> [Option<f64>; 5] {
         let cells: Vec<Option<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
@@ -94,6 +98,22 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             ),
             "",
         ),
+        file(
+            "separators at the end",
+            table(HEADER, rows, ",", plain).replace('\n', ",\n").replacen(",\n", "\n", 1),
+            "",
+        ),
+        file("separator behind the names", table(&format!("{HEADER},"), rows, ",", plain), ""),
+        file("carriage returns", table(HEADER, rows, ",", plain).replace('\n', "\r"), ""),
+        file("header twice", format!("{HEADER}\n{}", table(HEADER, rows, ",", plain)), ""),
+        file(
+            "names before each value",
+            table("", rows, " ", |i, value| {
+                let value = value.map_or("nan".to_owned(), |value| plain(i, Some(value)));
+                format!("{}:{value}", HEADER.split(',').nth(i).unwrap())
+            }),
+            "",
+        ),
         file("units", format!("{HEADER}\ns,rad,rad,m,m\n{}", table("", rows, ",", plain)), ""),
         file(
             "own names",
@@ -106,11 +126,120 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             "t_s=#1, cmd_qx_rad=#2, cmd_qy_rad=#3, x_m=#4, y_m=#5",
         ),
     ]);
+    #[cfg(feature = "parquet")]
+    {
+        let columns = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y";
+        for (name, bytes) in [("parquet", parquet_file(rows)), ("arrow", arrow_file(rows))] {
+            files.push(OddFile { name, bytes, columns, rate: None });
+        }
+    }
+    #[cfg(feature = "mcap")]
+    {
+        let columns = "t_s=stamp, cmd_qx_rad='q[0]', cmd_qy_rad='q[1]', x_m=ball.x, y_m=ball.y";
+        files.push(OddFile { name: "mcap", bytes: mcap_file(rows), columns, rate: None });
+    }
     #[cfg(feature = "xlsx")]
     {
         let columns = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y";
         files.push(OddFile { name: "workbook", bytes: spreadsheet(rows), columns, rate: None });
     }
+    files
+}
+
+/// The same recording in layouts whose numbers are rounded: other units, counts, dates.
+fn rounded_files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
+    let text = |name, columns, header: &str, end: &str, cell: &dyn Fn(usize, f64) -> String| {
+        let words = ["", "nan", "NaN", "NA", "N/A", "None", "null", "nil", "-", "--", "?", "#N/A"];
+        let mut n_missing = 0;
+        let mut lines = vec![header.to_owned()];
+        for row in rows {
+            let mut cells = Vec::new();
+            for (i, value) in row.iter().enumerate() {
+                n_missing += usize::from(value.is_none());
+                cells.push(value.map_or_else(
+                    || words[n_missing % words.len()].to_owned(),
+                    |value| cell(i, value),
+                ));
+            }
+            lines.push(cells.join(","));
+        }
+        let bytes = (lines.join(end) + end).into_bytes();
+        OddFile { name, bytes, columns, rate: None }
+    };
+    let degrees = |i: usize, value: f64| match i {
+        1 | 2 => format!("{:.3}", value.to_degrees()),
+        _ => value.to_string(),
+    };
+    // Three servos at 0, 120 and 240 degrees, whose angles are a linear map of those of the plate.
+    let legs = |row: &[Option<f64>; 5]| {
+        let [t, qx, qy, x, y] = row;
+        let (qx, qy) = (qx.unwrap().to_degrees(), qy.unwrap().to_degrees());
+        let leg =
+            |at: f64| format!("{:.4}", qy * at.to_radians().cos() + qx * at.to_radians().sin());
+        let cells = [plain(0, *t), leg(0.0), leg(120.0), leg(240.0), plain(3, *x), plain(4, *y)];
+        cells.join(",")
+    };
+    let legs: Vec<String> = rows.iter().map(legs).collect();
+    let legs = format!("t_s,a,b,c,x_m,y_m\n{}\n", legs.join("\n"));
+    let date = |value: f64| {
+        let micros = (value * 1e6).round() as u64;
+        let (seconds, micros) = (micros / 1_000_000, micros % 1_000_000);
+        format!("13:51:{seconds:02}.{micros:06}")
+    };
+    let apart = "t_s=date+clock, cmd_qx_rad=qx, cmd_qy_rad=qy, x_m=x, y_m=y";
+    let mut files = vec![
+        text(
+            "degrees",
+            "cmd_qx_rad=roll/deg, cmd_qy_rad=pitch/deg",
+            "t_s,roll,pitch,x_m,y_m",
+            "\r\n",
+            &degrees,
+        ),
+        text(
+            "pixels",
+            "x_m=px*0.0005-0.16, y_m=0.12-py*0.0005",
+            "t_s,cmd_qx_rad,cmd_qy_rad,px,py",
+            "\n",
+            &|i, value| match i {
+                3 => format!("{:.0}", (value + 0.16) / 0.0005),
+                4 => format!("{:.0}", (0.12 - value) / 0.0005),
+                _ => value.to_string(),
+            },
+        ),
+        text(
+            "microcontroller",
+            "t_s=us/us, cmd_qx_rad=q0*1e-4, cmd_qy_rad=q1*1e-4, x_m=x*1e-5, y_m=y*1e-5",
+            "us,q0,q1,x,y",
+            ",\n",
+            &|i, value| format!("{:.0}", value * [1e6, 1e4, 1e4, 1e5, 1e5][i]),
+        ),
+        text(
+            "dates",
+            "t_s=when, cmd_qx_rad=qx, cmd_qy_rad=qy, x_m=x, y_m=y",
+            "when,qx,qy,x,y",
+            "\n",
+            &|i, value| {
+                if i == 0 { format!("2026-02-20T{}+01:00", date(value)) } else { value.to_string() }
+            },
+        ),
+        text("date and time", apart, "date,clock,qx,qy,x,y", "\n", &|i, value| {
+            if i == 0 { format!("20.02.2026,{}", date(value)) } else { value.to_string() }
+        }),
+        OddFile {
+            name: "three servos",
+            bytes: legs.into_bytes(),
+            columns: "cmd_qy_rad=a/deg*0.6666666666666667-b/deg*0.3333333333333333-c/deg*0.3333333333333333, \
+                      cmd_qx_rad=b/deg*0.5773502691896258-c/deg*0.5773502691896258",
+            rate: None,
+        },
+    ];
+    let even = table("cmd_qx_rad;cmd_qy_rad;x_m;y_m", rows, ";", |i, value| match i {
+        0 => String::new(),
+        _ => plain(i, value),
+    });
+    // Without the empty cells of the time, and with a mark of the byte order.
+    let even = format!("\u{feff}{}", even.replace("\n;", "\n"));
+    files.push(OddFile { name: "rate", bytes: even.into_bytes(), columns: "", rate: Some(100.0) });
     files
 }
 
@@ -141,6 +270,13 @@ fn json_files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
         file("json columns", columns, ""),
         file("json split", json!({ "columns": names().collect::<Vec<_>>(), "data": rows }), ""),
         OddFile {
+            // As Python writes a missing number.
+            name: "json with NaN",
+            bytes: rows_of(true).to_string().replace("null", "NaN").into_bytes(),
+            columns: "",
+            rate: None,
+        },
+        OddFile {
             name: "json lines",
             bytes: lines.join("\n").into_bytes(),
             columns: "",
@@ -152,6 +288,71 @@ fn json_files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             "t_s=stamp.s, cmd_qx_rad='q[0]', cmd_qy_rad='q[1]', x_m=ball.x, y_m=ball.y",
         ),
     ]
+}
+
+/// The rows as columns with other names, types and units, and beside them columns that are not read.
+#[cfg(feature = "parquet")]
+fn record_batch(rows: &[[Option<f64>; 5]]) -> arrow_array::RecordBatch {
+    use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, StringArray};
+    use std::sync::Arc;
+
+    let column =
+        |i: usize| -> ArrayRef { Arc::new(Float64Array::from_iter(rows.iter().map(|row| row[i]))) };
+    let note: ArrayRef = Arc::new(StringArray::from(vec!["a note"; rows.len()]));
+    let is_seen: ArrayRef = Arc::new(BooleanArray::from_iter(rows.iter().map(|r| r[3].is_some())));
+    let number: ArrayRef = Arc::new(Int64Array::from_iter_values(0..rows.len() as i64));
+    arrow_array::RecordBatch::try_from_iter([
+        ("index", number),
+        ("note", note),
+        ("Zeit", column(0)),
+        ("seen", is_seen),
+        ("Roll", column(1)),
+        ("Pitch", column(2)),
+        ("X", column(3)),
+        ("Y", column(4)),
+    ])
+    .unwrap()
+}
+
+#[cfg(feature = "parquet")]
+fn parquet_file(rows: &[[Option<f64>; 5]]) -> Vec<u8> {
+    let batch = record_batch(rows);
+    let mut file = Vec::new();
+    let mut writer = parquet::arrow::ArrowWriter::try_new(&mut file, batch.schema(), None).unwrap();
+    writer.write(&batch).unwrap();
+    writer.close().unwrap();
+    file
+}
+
+#[cfg(feature = "parquet")]
+fn arrow_file(rows: &[[Option<f64>; 5]]) -> Vec<u8> {
+    let batch = record_batch(rows);
+    let mut writer = arrow_ipc::writer::FileWriter::try_new(Vec::new(), &batch.schema()).unwrap();
+    writer.write(&batch).unwrap();
+    writer.finish().unwrap();
+    writer.into_inner().unwrap()
+}
+
+/// Messages of a robot: one topic in JSON, with values within values, and one in another encoding.
+#[cfg(feature = "mcap")]
+fn mcap_file(rows: &[[Option<f64>; 5]]) -> Vec<u8> {
+    use mcap::records::MessageHeader;
+    use std::collections::BTreeMap;
+
+    let mut writer = mcap::WriteOptions::new().create(std::io::Cursor::new(Vec::new())).unwrap();
+    let mut channel = |topic: &str, encoding: &str| {
+        writer.add_channel(0, topic, encoding, &BTreeMap::new()).unwrap()
+    };
+    let (state, camera) = (channel("/state", "json"), channel("/camera", "cdr"));
+    for (sequence, [t, qx, qy, x, y]) in (0..).zip(rows) {
+        let message = json!({ "stamp": t, "q": [qx, qy], "ball": { "x": x, "y": y } }).to_string();
+        let header =
+            |channel_id| MessageHeader { channel_id, sequence, log_time: 7, publish_time: 7 };
+        writer.write_to_known_channel(&header(camera), b"picture").unwrap();
+        writer.write_to_known_channel(&header(state), message.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
 }
 
 /// A workbook with a title, other names and a line of units; a cell without a value is absent.
@@ -198,11 +399,14 @@ async fn a_recording_in_any_layout_is_judged_the_same_through_every_door() {
     client.asset("a").await;
     cli.write("a.json", &client.get("assets/a").await.text);
     let mut hashes = Vec::new();
-    for (i, file) in files(&rows).iter().enumerate() {
+    let n_files = files(&rows).len();
+    for (i, file) in files(&rows).iter().chain(&rounded_files(&rows)).enumerate() {
         let summary = replayed(&cli, file);
         // Of another asset, as an asset remembers the faults of its earlier sessions.
         client.asset(&format!("a{i}")).await;
-        let path = format!("assets/a{i}/sessions/import?name=s&columns={}", encoded(file.columns));
+        let rate = file.rate.map(|rate| format!("&rate={rate}")).unwrap_or_default();
+        let columns = encoded(file.columns);
+        let path = format!("assets/a{i}/sessions/import?name=s&columns={columns}{rate}");
         let request = client
             .request(reqwest::Method::POST, &path)
             .header("content-type", "application/octet-stream");
@@ -213,7 +417,8 @@ async fn a_recording_in_any_layout_is_judged_the_same_through_every_door() {
         assert!(!summary["faults"].as_array().unwrap().is_empty(), "{}", file.name);
         hashes.push((file.name, hash.clone()));
     }
-    assert!(hashes.iter().all(|(_, hash)| *hash == hashes[0].1), "{hashes:?}");
+    let same = &hashes[..n_files];
+    assert!(same.iter().all(|(_, hash)| *hash == same[0].1), "{same:?}");
 }
 
 fn encoded(text: &str) -> String {
@@ -330,6 +535,79 @@ async fn unknown_keys_of_a_batch_are_named() {
     assert!(ack["rejected"][0]["reason"].as_str().unwrap().contains("none of the keys"), "{ack}");
     let meant = json!([{ "key": "cmd_qx", "meant": "cmd_qx_rad" }, { "key": "x", "meant": "x_m" }]);
     assert_eq!(ack["unknown"], meant);
+    assert_eq!(client.get("assets/a/link").await.expect(200)["unknown"], meant);
+}
+
+/// The summary of `offbd replay` for some rows.
+fn summary(cli: &CliFixture, rows: &[[Option<f64>; 5]]) -> Value {
+    cli.write("some.csv", &table(HEADER, rows, ",", plain));
+    let output = cli.ok("replay --format json some.csv").stdout;
+    serde_json::from_str(output.lines().last().unwrap()).unwrap()
+}
+
+#[test]
+fn a_session_that_begins_before_the_ball_waits_for_it() {
+    let cli = CliFixture::new();
+    cli.ok("simulate --seconds 30 -o sick.csv");
+    let mut rows = read_rows(&cli);
+    for row in &mut rows {
+        (row[3], row[4]) = (None, None);
+    }
+    let dead = summary(&cli, &rows);
+    assert_eq!(dead["faults"], json!(["sensor"]), "commands ask for a ball: {dead}");
+    for row in &mut rows {
+        (row[1], row[2]) = (Some(0.0), Some(0.0));
+    }
+    let waiting = summary(&cli, &rows);
+    assert_eq!(waiting["faults"], json!([]), "{waiting}");
+}
+
+/// A form with files, as curl and browsers send it.
+fn form(files: &[(&str, &str)]) -> Vec<u8> {
+    let part = |(name, text): &(&str, &str)| {
+        format!(
+            "--edge\r\nContent-Disposition: form-data; name=\"file\"; filename=\"{name}\"\r\n\
+             Content-Type: text/csv\r\n\r\n{text}\r\n"
+        )
+    };
+    let parts: String = files.iter().map(part).collect();
+    (parts + "--edge--\r\n").into_bytes()
+}
+
+#[tokio::test]
+async fn the_files_of_a_form_are_one_recording_or_none() {
+    let cli = CliFixture::new();
+    let rows = rows(&cli);
+    let part = |rows: &[[Option<f64>; 5]]| table(HEADER, rows, ",", plain);
+    let (first, rest, overlap) = (part(&rows[..1000]), part(&rows[1000..]), part(&rows[900..]));
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    for asset in ["a", "b", "c"] {
+        client.asset(asset).await;
+    }
+    let import = async |asset: &str, query: &str, files: &[(&str, &str)]| {
+        let path = format!("assets/{asset}/sessions/import?name=s&{query}");
+        let request = client
+            .request(reqwest::Method::POST, &path)
+            .header("content-type", "multipart/form-data; boundary=edge");
+        client.send(request.body(form(files))).await
+    };
+    let whole = import("a", "", &[("whole.csv", &part(&rows))]).await.expect(201);
+    let joined = import("b", "join=true", &[("2.csv", &rest), ("1.csv", &first)]).await.expect(201);
+    let verdict = |imported: &Value| imported["session"]["verdict"]["verdict_hash"].clone();
+    assert_eq!(verdict(&joined), verdict(&whole));
+    let before = client.get("sessions").await.expect(200)["items"].clone();
+    for (query, files, reason) in [
+        ("join=true", &[("1.csv", &*first), ("2.csv", "nothing")][..], "2.csv: no line has two"),
+        ("join=true", &[("1.csv", &first), ("2.csv", &overlap)], "2.csv: it has a sample at"),
+        ("join=false", &[("1.csv", &first), ("2.csv", &rest)], "the form has 2 files"),
+        ("dry_run=true", &[("1.csv", &first), ("2.csv", &rest)], "one file at a time"),
+        ("", &[], "the form"),
+    ] {
+        let refused = import("c", query, files).await.expect(400);
+        assert!(refused["detail"].as_str().unwrap().contains(reason), "{refused}");
+    }
+    assert_eq!(client.get("sessions").await.expect(200)["items"], before, "nothing is imported");
 }
 
 /// A recording in parts, whose names are not in the order of their times.

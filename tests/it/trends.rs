@@ -134,9 +134,9 @@ async fn a_weakening_servo_has_a_warning_before_its_fault_is_confirmed() {
     // With a new calibration there are no trends yet.
     learn(client, "weak", 2).await;
     assert_eq!(fleet_warnings(client, "weak").await, json!([]));
-    let anew = trends(client, "weak").await;
-    assert_eq!(anew["trends"], json!([]));
-    assert_ne!(anew["calibration_id"], before["calibration_id"]);
+    let again = trends(client, "weak").await;
+    assert_eq!(again["trends"], json!([]));
+    assert_ne!(again["calibration_id"], before["calibration_id"]);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -7,13 +7,16 @@
 
 mod schema;
 
+use std::ffi::OsStr;
+use std::process::Command;
+
 use offbd::store::Store;
 use schema::{Filled, JOURNAL, latest};
 use serde_json::{Value, json};
 use sqlx::Executor;
 
-use crate::support::process::{Process, ended};
-use crate::support::{Client, config, connection, eventually, judged, rig, url};
+use crate::support::process::{Process, ended, program};
+use crate::support::{Client, config, connection, eventually, judged, on_postgres, rig, url};
 
 /// Samples of the session that is open while the schema changes, and how many of them are
 /// sent before.
@@ -153,4 +156,50 @@ async fn a_database_with_samples_in_files_is_not_migrated() {
     let kept: i64 =
         sqlx::query_scalar("SELECT COUNT(*) FROM cold_file").fetch_one(&mut db).await.unwrap();
     assert_eq!(kept, 1);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_store_of_a_newer_version_is_refused_with_what_to_do() {
+    let data = tempfile::tempdir().unwrap();
+    let process = Process::start(data.path());
+    process.client.asset("a").await;
+    drop(process);
+    let copy = data.path().join("copy");
+    let mut db = connection(&url(data.path())).await;
+    // As if two later migrations were applied.
+    for version in [998, 999] {
+        let later = "INSERT INTO _sqlx_migrations
+            SELECT $1, 'later', installed_on, success, checksum, execution_time
+            FROM _sqlx_migrations WHERE version = 1";
+        sqlx::query(later).bind(version).execute(&mut db).await.unwrap();
+    }
+    let folder = data.path().join("data");
+    let run = |command: &str, more: &[&OsStr]| {
+        let mut run = Command::new(program());
+        run.arg(command).args(more).env("OFFBD_LISTEN", "127.0.0.1:0");
+        match command {
+            "restore" => run.arg("--data").arg(&folder),
+            _ => run.args(["--database", &url(data.path())]),
+        };
+        let output = run.output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        let expected = format!(
+            "the database has schema 999, and this version has {}: use a newer version of offbd",
+            latest()
+        );
+        assert!(said.trim_end().ends_with(&expected), "{command}: {said}");
+        assert_eq!(output.status.code(), Some(3), "{command}");
+    };
+    for command in ["serve", "migrate", "check"] {
+        run(command, &[]);
+    }
+    run("token", &["list".as_ref()]);
+    if !on_postgres() {
+        run("backup", &[copy.as_ref()]);
+        assert!(!copy.exists());
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)").await.unwrap();
+        std::fs::copy(data.path().join("offbd.sqlite"), &copy).unwrap();
+        run("restore", &[copy.as_ref()]);
+        assert!(!folder.join("offbd.sqlite").exists());
+    }
 }

@@ -26,16 +26,22 @@ test("alarms from before the page was opened are listed and acknowledged togethe
     await view.getByRole("checkbox", { name: new RegExp(`X servo.* of ${rig}`) }).check();
   await view.getByLabel(ACTOR).fill("ada");
   await view.getByText("2 alarms").waitFor();
-  // Several at once are acknowledged after a question.
-  await view.getByRole("button", { name: "Acknowledge 2" }).click();
-  const question = view.getByRole("dialog", { name: "Acknowledge 2 alarms?" });
-  await question.getByText("cannot be taken back").waitFor();
-  await question.getByRole("button", { name: "Acknowledge 2" }).click();
+  const areAcknowledged = async (wanted) => {
+    for (const rig of ["bench", "shelf"]) {
+      const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
+      assert.equal(fault.acknowledged, wanted, rig);
+    }
+  };
+  // It can be taken back for a while.
+  const acknowledge = view.getByRole("button", { name: "Acknowledge 2" });
+  await acknowledge.click();
+  await view.getByText("Acknowledging 2 alarms.").waitFor();
+  await view.getByRole("button", { name: "Undo" }).click();
+  await view.getByText("Acknowledging 2 alarms.").waitFor({ state: "detached" });
+  await areAcknowledged(false);
+  await acknowledge.click();
   await view.getByText("ada,").nth(1).waitFor();
-  for (const rig of ["bench", "shelf"]) {
-    const fault = await ask(service.url, "GET", `/assets/${rig}/faults/x_servo`);
-    assert.equal(fault.acknowledged, true, rig);
-  }
+  await areAcknowledged(true);
   await view.getByRole("checkbox", { name: "Unacknowledged only", exact: true }).check();
   await view
     .getByRole("link", { name: /X servo/ })
@@ -59,20 +65,34 @@ test("alarms are found by a part of the rig's name, ordered and grouped", async 
   await view.done();
 });
 
-test("the number of alarms that fail and that nobody has acknowledged is in the header", async () => {
+test("the number of alarms that fail and that nobody has acknowledged is in the header and the title", async () => {
   await ask(service.url, "POST", "/assets", { ...learntRig, name: "badge" });
+  await ask(service.url, "POST", "/assets", { ...learntRig, name: "unlearnt", calibration: null });
   const view = await page(chromium);
   await view.goto(`${service.url}/sessions`);
   const link = view.getByRole("navigation", { name: "Views" }).getByRole("link", { name: /^Alarms/ });
   const badge = async () => Number((await link.textContent()).replace("Alarms", "").trim());
   await link.waitFor();
   const before = await badge();
+  const isShown = async (n) =>
+    (await badge()) === n && (await view.title()) === `${n ? `(${n}) ` : ""}Sessions · offbd`;
+  // Without a calibration, the fault is suspected only.
+  await imported(service.url, "unlearnt", "monday", sickRows);
   await imported(service.url, "badge", "monday", sickRows);
-  await until(async () => (await badge()) === before + 1);
+  await until(() => isShown(before + 1));
+  const { items } = await ask(service.url, "GET", "/alarms?state=suspected");
+  assert.deepEqual(
+    items.map(({ asset, code }) => [asset, code]),
+    [["unlearnt", "x_servo"]],
+  );
   const alarms = [{ asset: "badge", code: "x_servo" }];
   await ask(service.url, "POST", "/alarms/acknowledge", { alarms });
-  await until(async () => (await badge()) === before);
-  await ask(service.url, "DELETE", "/assets/badge");
+  await until(() => isShown(before));
+  await view.goto(`${service.url}/alarms`);
+  await view.getByLabel("State").selectOption({ label: "Suspected" });
+  await view.getByRole("row", { name: /unlearnt X servo/ }).waitFor();
+  await view.getByText("1 alarm", { exact: true }).waitFor();
+  for (const name of ["badge", "unlearnt"]) await ask(service.url, "DELETE", `/assets/${name}`);
   await view.done();
 });
 
@@ -101,6 +121,44 @@ test("what to do is told, and the owner's note is kept", async () => {
   }
   await view.emulateMedia({ media: "print" });
   assert.equal(await view.getByRole("button", { name: "Edit the remark" }).isVisible(), false);
+  await view.done();
+});
+
+test("of two people who write a remark on a fault, or mute it, the second is told", async () => {
+  const write = (view, text) => view.getByRole("textbox", { name: "Remark on every fault" }).fill(text);
+  const open = async (button) => {
+    const view = await page(chromium);
+    await view.goto(`${service.url}/rigs/shelf/faults/x_servo`);
+    await view.getByRole("button", { name: button }).click();
+    return view;
+  };
+  const refused = async (view, words) => {
+    await view.getByRole("button", { name: "Save" }).click();
+    await view.getByText(words).waitFor();
+    await view.done();
+  };
+  await ask(service.url, "PUT", "/advice/x_servo/note", { text: "" });
+  const first = await open("Add a remark");
+  await write(first, "from the page");
+  await ask(service.url, "PUT", "/advice/x_servo/note", { text: "from a program" });
+  await refused(first, "Somebody has changed this since the page showed it");
+  const second = await open("Edit the remark");
+  await write(second, "from the page");
+  await ask(service.url, "PUT", "/advice/x_servo/note", { text: "" });
+  await refused(second, "Somebody has deleted this since the page showed it");
+  const { notes } = await ask(service.url, "GET", "/advice");
+  assert.deepEqual(notes, []);
+});
+
+test("a rig that somebody deletes while its page is open is not shown any longer", async () => {
+  await ask(service.url, "POST", "/assets", { ...learntRig, name: "gone" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/gone`);
+  await view.getByRole("heading", { name: "From above" }).waitFor();
+  await ask(service.url, "DELETE", "/assets/gone");
+  await view.getByRole("alert").getByText("Somebody deleted it while this page was open").waitFor();
+  await view.getByRole("link", { name: "Go to the fleet" }).click();
+  await view.getByRole("heading", { name: "Fleet" }).waitFor();
   await view.done();
 });
 

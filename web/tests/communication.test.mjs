@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
+import { recordings } from "./rigs.mjs";
 import { ask, browser, directory, page, remove, serve, until } from "./support.mjs";
 
 let work, service, chromium;
@@ -40,7 +41,7 @@ test("lost communication is told since when and by whom it is acknowledged, and 
   const row = fleet.getByRole("list", { name: "Rigs" });
   await row.getByText(/No data since \d/).waitFor();
 
-  // A page that is opened now has no reason of its own to call the rig silent.
+  // A page that is opened now has no reason to call the rig silent.
   const late = await page(chromium);
   await late.goto(`${service.url}/rigs/bench`);
   await late.getByText(/No data since \d/).waitFor();
@@ -96,6 +97,10 @@ test("the card of the link tells how the samples of a rig arrive", async () => {
     assert.equal(await cell(card, "Sent twice", column).textContent(), "none");
   }
   await card.getByText("which does not tell the time of day").waitFor();
+  assert.equal(await card.getByText("not understood").count(), 0);
+  const foreign = { session: "s", samples: [{ t_s: 1.99, x_m: 0, y_m: 0, cmd_qx: 0 }] };
+  await ask(service.url, "POST", "/assets/linked/telemetry", foreign);
+  await card.getByText("Keys of the telemetry that are not understood: cmd_qx (cmd_qx_rad?).").waitFor();
   await card.getByText(/^as of \d/).waitFor();
   await card.getByText(/^This session, counted since \d/).waitFor();
   // A page that is opened after the samples has nothing to draw, and says so instead of empty charts.
@@ -141,5 +146,35 @@ test("lost communication is muted with a reason and for a time, before it is los
   await row.getByText("“No data” muted").waitFor({ state: "detached" });
   assert.deepEqual([...view.errors, ...fleet.errors], []);
   await fleet.done();
+  await view.done();
+});
+
+test("a rig that falls silent while it fails is told as both, everywhere", async () => {
+  const { learnt, sick } = recordings(work);
+  await ask(service.url, "POST", "/assets", { ...learnt, name: "cut" });
+  await ask(service.url, "POST", "/assets/cut/telemetry", sick, "text/csv");
+  const view = await page(chromium, { viewport: { width: 1440, height: 900 } });
+  await view.goto(service.url);
+  const row = view.getByRole("link", { name: /^cut/ });
+  const isCut = (chip) => chip.evaluate((box) => box.scrollWidth > box.clientWidth);
+  const silence = row.getByText(/No data since \d/);
+  await silence.waitFor();
+  assert.equal(await isCut(silence), false, "the time is at its end");
+  await row.getByTitle(/^X servo.*: failed \d.*, when last tested; now silent$/).waitFor();
+  await view.goto(`${service.url}/alarms`);
+  const alarm = view.getByRole("row", { name: /cut X servo/ });
+  await alarm.getByText(/^▲ failed when last tested; silent since \d/).waitFor();
+  await view.goto(`${service.url}/rigs/cut`);
+  const banner = view.getByRole("list", { name: "Active faults" });
+  await banner.getByText(/^failed \d.*, when last tested; now silent$/).waitFor();
+  for (const path of ["/rigs/cut/faults/x_servo", "/rigs/cut/faults/x_servo/report"]) {
+    await view.goto(service.url + path);
+    await view
+      .getByText(/^It failed when it was last tested, \d.* The rig has been silent since \d/)
+      .waitFor();
+  }
+  await view.goto(`${service.url}/rigs/cut/faults/x_servo`);
+  await view.getByRole("heading", { name: /failed when last tested; now silent$/ }).waitFor();
+  assert.deepEqual(view.errors, []);
   await view.done();
 });

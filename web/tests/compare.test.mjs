@@ -30,6 +30,17 @@ test("two sessions of the list are compared on one time axis", async () => {
   await view.waitForURL(/shift=2\.5/);
   await view.getByLabel("Axis").selectOption("y");
   assert.equal(await view.getByRole("img", { name: /^Residual along y/ }).count(), 2);
+  // In one chart, the later curve goes beyond the earlier one.
+  await view.getByLabel("Charts").selectOption("overlaid");
+  const chart = view.getByRole("img", { name: /^Residual along y .* of healthy and of sick/ });
+  await chart.locator("canvas").waitFor();
+  assert.equal(await view.getByRole("img", { name: /^Residual along y/ }).count(), 1);
+  await chart.hover({ position: { x: 300, y: 60 } });
+  for (const name of ["healthy", "sick"])
+    await view
+      .locator(".key", { hasText: new RegExp(`^${name} [−\\d]`) })
+      .first()
+      .waitFor();
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -109,7 +109,7 @@ test("the script resumes, and the demo continues after a visitor ends the sessio
   await view.goto(`${show.url}/demo`);
   await view.waitForURL(/\/learn$/);
   await view.getByRole("button", { name: "Resume the script" }).click();
-  await view.getByText("A script injects and repairs faults").waitFor();
+  await view.getByText("A script breaks and repairs the rig").waitFor();
   await view.goto(`${show.url}/rigs/demo-rig`);
   const session = view.locator("dt:text-is('Session') + dd");
   await session.getByText("demo-").waitFor();

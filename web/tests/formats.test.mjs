@@ -143,7 +143,7 @@ test("of several dropped files one is taken, and the page says which", async () 
       [names, rig.sick],
     );
   await drop("monday.csv", "tuesday.csv", "friday.csv");
-  await view.getByText("monday.csv was taken, the 2 other files were not").waitFor();
+  await view.getByText("Only monday.csv was taken; import files one by one.").waitFor();
   await view.keyboard.press("Escape");
   await view.getByRole("dialog").waitFor({ state: "detached" });
   await drop("monday.csv");

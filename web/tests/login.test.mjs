@@ -66,7 +66,7 @@ test("a token opens the requested page", async () => {
   assert.ok(!JSON.stringify(await view.evaluate("({ ...localStorage })")).includes(admin));
 });
 
-test("a device's snippet shows a token of its own", async () => {
+test("a device's snippet shows its own token", async () => {
   const snippet = view.getByRole("region", { name: "Python snippet" });
   assert.match(await snippet.textContent(), /Bearer offbd_TOKEN/);
   await view.getByRole("button", { name: "Create a token for this rig" }).click();

@@ -81,6 +81,7 @@ test("a channel is changed in the page, and its secrets stay and are not shown",
   const webhook = await edit("workshop");
   assert.match(await webhook.getByLabel("URL").inputValue(), /\/hook$/);
   await webhook.getByLabel("URL").fill(`http://127.0.0.1:${receiver.address().port}/other`);
+  await webhook.getByLabel("Format").selectOption({ label: "Slack, Mattermost" });
   await webhook.getByRole("button", { name: "Save" }).click();
   await webhook.waitFor({ state: "detached" });
   await view.getByText("/other").waitFor();
@@ -88,6 +89,7 @@ test("a channel is changed in the page, and its secrets stay and are not shown",
   const before = received.length;
   await view.getByRole("button", { name: "Test workshop" }).click();
   await until(() => received.length > before);
+  assert.match(received.at(-1).text, /^This is a test/, "as Slack takes it");
 
   const dialog = await edit("mail");
   assert.equal(await dialog.getByLabel("User").inputValue(), "offbd");

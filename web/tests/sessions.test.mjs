@@ -91,9 +91,25 @@ test("played back, scrubbed, judged again, recorded, downloaded, deleted", async
   await view.getByRole("button", { name: "Judge again" }).click();
   await view.getByText("Different verdict").waitFor();
   await view.getByText("X servo, Y servo").waitFor();
+  // What moved has both of its times.
+  const moved = view
+    .getByRole("region", { name: "Differences" })
+    .getByRole("row")
+    .filter({ hasText: /(earlier|later)$/ });
+  const [from, , to, , by] = (await moved.first().getByRole("cell").allTextContents()).map(parseFloat);
+  assert.ok(from !== to && Math.abs(Math.abs(from - to) - by) < 0.011, `${from} s to ${to} s, by ${by} s`);
   await view.getByLabel("Profile").selectOption("");
   await view.getByRole("button", { name: "Judge again" }).click();
   await view.getByText("Identical verdict.").waitFor();
+  // The kind is told wherever the verdict is.
+  const told = await view.locator(".verdict .result").textContent();
+  assert.match(told, /^X servo \(.*dead/);
+  for (const side of [0, 1])
+    assert.equal(await view.locator(".verdicts dl").nth(side).locator("dd").first().textContent(), told);
+  const list = await page(chromium);
+  await list.goto(`${service.url}/sessions?asset=bench&name=sick`);
+  await list.getByRole("row").filter({ hasText: "sick" }).getByText(told, { exact: true }).waitFor();
+  await list.done();
 
   await view.getByRole("button", { name: "Play" }).click();
   await view.getByRole("button", { name: /record/ }).click();

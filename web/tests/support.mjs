@@ -130,7 +130,7 @@ export async function browser(options = {}) {
 const UNREACHABLE =
   /ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_EMPTY_RESPONSE/;
 
-/** Opens a page that collects its errors, in a context of its own. */
+/** Opens a page that collects its errors, in its own context. */
 export async function page(of, options = {}) {
   const context = await of.newContext({
     viewport: { width: 1280, height: 800 },

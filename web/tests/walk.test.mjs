@@ -36,7 +36,7 @@ test("from the demo to the explanation of a fault", async () => {
   });
 
   await press("Lessons", "link");
-  await view.getByText("A script injects and repairs faults").waitFor();
+  await view.getByText("A script breaks and repairs the rig").waitFor();
   await press("Repair all");
   await view.getByText("The script is paused: you control the faults.").waitFor();
   await press("dead", "button", "Inject: X servo, dead");

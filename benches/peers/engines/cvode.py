@@ -28,7 +28,7 @@ def to_each(memory, vector, y, times):
 
 @njit
 def restarting(memory, vector, y, ticks):
-    """States after each tick, begun anew at each."""
+    """States after each tick, begun again at each."""
     reached = np.zeros(1)
     states = np.empty((ticks + 1, len(y)))
     states[0] = y
@@ -59,7 +59,7 @@ class Run:
         return to_each(*self._begin(), times)
 
     def restarted(self):
-        """Begun anew at every tick, as where the plate's next reading is awaited."""
+        """Begun again at every tick, as where the plate's next reading is awaited."""
         return restarting(*self._begin(), round(self.scene.duration / TICK))
 
 

@@ -63,7 +63,7 @@ class Tuning:
         """Attributes of the options. A lone contact is solved cheapest by PGS.
 
         The tolerance is relative to the heaviest body, and the plate's inertia is
-        no part of the problem: at the 1e-8 that is shipped the ball is ignored.
+        not part of the problem: at the 1e-8 that is shipped the ball is ignored.
         """
         if self.shipped:
             return 'tolerance="1e-15"'

@@ -50,7 +50,7 @@ def plate_path(scene, step):
 
 
 class Run:
-    """A world with a plate and a ball; made anew for every repeat, outside the timing."""
+    """A world with a plate and a ball; a new one for every repeat, outside the timing."""
 
     def __init__(self, scene, tuning, step, lead):
         self.scene, self.step, self.tuning, self.lead = scene, step, tuning, lead

@@ -30,7 +30,7 @@ const CONNECTION_TIME: Duration = Duration::from_secs(15 * 60);
 /// What signs the answers.
 pub(super) struct Issuer {
     key: KeyPair,
-    /// The account of the server that devices are in.
+    /// The account of the NATS server to which devices belong.
     account: String,
 }
 
@@ -226,9 +226,9 @@ async fn principal(
 /// Returns the claims of a question whose signature is that of the server that it names.
 fn verified(question: &[u8]) -> Result<Question, CalloutError> {
     let invalid = |reason: &str| CalloutError::Question(reason.to_owned());
-    let text = str::from_utf8(question).map_err(|_| invalid("it is no text"))?;
-    let (message, signature) = text.rsplit_once('.').ok_or_else(|| invalid("it is no token"))?;
-    let (_, claims) = message.split_once('.').ok_or_else(|| invalid("it is no token"))?;
+    let text = str::from_utf8(question).map_err(|_| invalid("it is not text"))?;
+    let (message, signature) = text.rsplit_once('.').ok_or_else(|| invalid("it is not a token"))?;
+    let (_, claims) = message.split_once('.').ok_or_else(|| invalid("it is not a token"))?;
     let decoded = |part: &str| {
         BASE64URL_NOPAD.decode(part.as_bytes()).map_err(|_| invalid("it is not base64url"))
     };
@@ -236,7 +236,7 @@ fn verified(question: &[u8]) -> Result<Question, CalloutError> {
         .map_err(|error| CalloutError::Question(error.to_string()))?;
     let by_server = question.iss.starts_with('N') && question.iss == question.nats.server_id.id;
     let key = by_server.then(|| KeyPair::from_public_key(&question.iss));
-    let key = key.and_then(Result::ok).ok_or_else(|| invalid("its issuer is no server"))?;
+    let key = key.and_then(Result::ok).ok_or_else(|| invalid("its issuer is not a server"))?;
     key.verify(message.as_bytes(), &decoded(signature)?)
         .map_err(|error| CalloutError::Question(error.to_string()))?;
     Ok(question)

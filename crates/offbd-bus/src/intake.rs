@@ -1,4 +1,4 @@
-//! Messages of devices: from a message to a batch, from a batch to its answer.
+//! Messages of devices: makes a batch of each, and an answer of the result.
 
 use std::future::Future;
 use std::mem::replace;
@@ -143,7 +143,7 @@ fn refusal(id: Option<String>, problem: Problem) -> BatchRefusalView {
 pub(super) enum MessageReply {
     /// The answer is sent to the device.
     Answer(BatchAnswer),
-    /// Nothing is sent: it was no batch, or the owner of the asset answers.
+    /// Nothing is sent: it was not a batch, or the owner of the asset answers.
     Nothing,
     /// Nothing is sent, and the message has to come again, if the bus can repeat it.
     Again,
@@ -160,9 +160,9 @@ impl MessageReply {
     }
 }
 
-/// What has become of an attempt to have a batch stored.
+/// The result of an attempt to store a batch.
 struct Attempt<R> {
-    /// In order of arrival.
+    /// The number of the message, in order of arrival.
     number: u64,
     delivery: Delivery<R>,
     reply: MessageReply,

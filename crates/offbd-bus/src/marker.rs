@@ -1,6 +1,6 @@
 //! Finds out what an MQTT broker still has of the retained messages.
 //!
-//! offbd keeps a retained message of its own at the broker, the marker, with the number of the
+//! offbd keeps its own retained message at the broker, the marker, with the number of the
 //! event up to which everything is published. To ask for it, offbd subscribes to its topic, and
 //! then publishes a question there. A broker queues the retained messages for a subscriber before
 //! it handles the subscriber's next packet, and keeps the order of messages of the same topic and

@@ -3,7 +3,7 @@
 //! A message of QoS 1 is acknowledged to the broker (PUBACK) once its batch is durable or
 //! refused for good, in the order of arrival. If a batch cannot be taken at present, the
 //! connection is made again, and the broker repeats what was not acknowledged. Each connection
-//! has a client of its own, so that no acknowledgement of one is sent on another.
+//! has its own client, so that no acknowledgement of one is sent on another.
 
 use std::fmt;
 use std::future::pending;
@@ -70,7 +70,7 @@ pub struct MqttSettings {
     pub faults: bool,
     /// Whether the service says whether it is connected.
     pub state: bool,
-    /// Topics of devices with formats of their own.
+    /// Topics of devices with their own formats.
     pub mapping: Mapping,
 }
 
@@ -88,8 +88,8 @@ pub enum MqttError {
 /// Connects, and stays connected until the service stops.
 ///
 /// # Errors
-/// [`MqttError`] if the certificates cannot be read. A broker that cannot be reached is no
-/// error: the connection is tried again.
+/// [`MqttError`] if the certificates cannot be read. A broker that cannot be reached is not
+/// an error: the connection is tried again.
 pub fn start(
     service: Service,
     settings: MqttSettings,
@@ -305,7 +305,7 @@ impl Broker<'_> {
         self.connected.send_replace(Some(connection.link.clone()));
     }
 
-    /// Queues a message of a device. One that is no batch, or cannot be read, is answered at
+    /// Queues a message of a device. One that is not a batch, or cannot be read, is answered at
     /// once.
     fn receive(
         &self,
@@ -363,7 +363,7 @@ impl Broker<'_> {
         let (asset, kind) =
             TopicStyle::Mqtt.parse(topic).map_err(|error| refused(topic, &error))?;
         if is_retained && kind == DeviceTopic::Telemetry {
-            tracing::warn!(topic, "a retained message is no new telemetry; it is ignored");
+            tracing::warn!(topic, "a retained message is not new telemetry; it is ignored");
             return Err(MessageOutcome::Retained);
         }
         Ok((asset, kind.into()))

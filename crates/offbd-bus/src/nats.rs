@@ -87,7 +87,7 @@ pub enum NatsError {
 ///
 /// # Errors
 /// [`NatsError`] if the settings are invalid, or the server's are unsafe. A server that cannot
-/// be reached is no error: the connection is tried again.
+/// be reached is not an error: the connection is tried again.
 pub async fn start(
     service: Service,
     settings: NatsSettings,
@@ -318,7 +318,7 @@ impl NatsBus {
                 match issuer.answer(&service, &message.payload).await {
                     Ok(answer) => send(&client, reply, answer.into_bytes()).await,
                     Err(error) => {
-                        tracing::warn!(%error, "the question of a NATS server is ignored")
+                        tracing::warn!(%error, "a login request of the NATS server is not valid; it is ignored")
                     }
                 }
                 drop(permit);
@@ -365,7 +365,7 @@ async fn send(client: &Client, subject: impl async_nats::subject::ToSubject, doc
 /// Answers devices with the service's own rights, and so only where they may receive.
 struct NatsAnswers {
     client: Client,
-    /// Whether the devices of each asset receive replies below a subject of their own.
+    /// Whether the devices of each asset receive replies below their own subject.
     own_inboxes: bool,
     reasons: Arc<Reasons>,
 }
@@ -427,7 +427,7 @@ impl Publishing for Client {
 }
 
 /// Sends messages to itself, and makes the connection again if one does not arrive: a link may
-/// lose messages without a word. The client itself asks the server for a sign of life only while
+/// lose messages silently. The client itself asks the server for a sign of life only while
 /// nothing arrives, so it does not notice that what it sends is lost.
 async fn listen_to_itself(client: &Client) {
     let inbox = client.new_inbox();

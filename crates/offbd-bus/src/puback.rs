@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 /// Messages of one connection that are not acknowledged yet, in order of arrival. A new
-/// connection has a new queue, because its broker gives the numbers of packets anew.
+/// connection has a new queue, because its broker numbers the packets from 1 again.
 pub(super) struct PubackQueue<T> {
     waiting: VecDeque<(T, bool)>,
     /// The number of the first one that waits.

@@ -138,7 +138,7 @@ fn format(args: &SessionExport, output: &Path) -> Result<SessionFormat, BadArgum
     let by_suffix = || suffix.and_then(|suffix| parse_format(suffix).ok());
     let format = args.format.or_else(by_suffix).ok_or_else(|| {
         let formats = FORMATS.map(SessionFormat::suffix).join(", ");
-        BadArgument(format!("the suffix of FILE is no format; add --format, one of {formats}"))
+        BadArgument(format!("the suffix of FILE is not a format; add --format, one of {formats}"))
     })?;
     format.check().map_err(|e| BadArgument(e.to_string()))?;
     Ok(format)
@@ -160,7 +160,7 @@ fn info(
     };
     let runs = judge::judge_file(setup, &args.session, table)?;
     let [judged] = &runs[..] else {
-        let reason = "its clock starts again; write each run into a file";
+        let reason = "its clock starts again: write each run into a separate file";
         return Err(InputError::file(&args.session, reason).into());
     };
     Ok(SessionInfo {
@@ -209,7 +209,7 @@ fn write(
     }
     if n_rejected > MAX_NAMED_ROWS {
         anstream::eprintln!(
-            "{}: {} more rows left out",
+            "{}: {} more rows are left out",
             path.display(),
             n_rejected - MAX_NAMED_ROWS
         );

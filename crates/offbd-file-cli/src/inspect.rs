@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::judge::TableArgs;
+use crate::judge::{self, TableArgs};
 use offbd_terminal::errors::InputError;
 use offbd_terminal::output::{self, OutputFormat};
 use offbd_terminal::table;
@@ -29,6 +29,9 @@ pub struct InspectArgs {
     /// The recording
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// The rig's asset file, whose `columns` are used for a file that has them all
+    #[arg(long, value_name = "ASSET.json")]
+    asset: Option<PathBuf>,
     #[command(flatten)]
     table: TableArgs,
     /// Text for people, or one JSON object
@@ -39,7 +42,9 @@ pub struct InspectArgs {
 pub fn run(args: &InspectArgs) -> anyhow::Result<()> {
     let failed = |e: String| InputError::file(&args.file, e);
     let file = File::open(&args.file).map_err(|e| failed(e.to_string()))?;
-    let view = inspect(file, &args.table.options()).map_err(|e| failed(e.to_string()))?;
+    let rig = judge::load_rig(args.asset.as_deref())?;
+    let options = args.table.options().of_rig(rig.columns.as_deref());
+    let view = inspect(file, &options).map_err(|e| failed(e.to_string()))?;
     let mut out = output::stdout();
     match args.format {
         OutputFormat::Json => {
@@ -128,8 +133,12 @@ fn write_quantities(out: &mut impl Write, view: &InspectionView) -> anyhow::Resu
 }
 
 fn write_rows(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<()> {
+    // Of a table without a mapping no row is read.
+    if view.rows == 0 && view.rejected == 0 {
+        return Ok(());
+    }
     write!(out, "\n{} rows", view.rows)?;
-    if let (Some(from), Some(to)) = (view.from_s, view.to_s) {
+    if let (Some(from), Some(to), 1) = (view.from_s, view.to_s, view.runs) {
         write!(out, " from {from:.2} to {to:.2} s")?;
     }
     if let Some(rate) = view.rate_hz {
@@ -137,7 +146,8 @@ fn write_rows(out: &mut impl Write, view: &InspectionView) -> anyhow::Result<()>
     }
     writeln!(out, ", without a ball {:.1} %", 100.0 * view.without_ball)?;
     if view.gaps > 0 {
-        writeln!(out, "{} gaps, the longest of {:.2} s", view.gaps, view.longest_gap_s)?;
+        let gaps = if view.gaps == 1 { "gap" } else { "gaps" };
+        writeln!(out, "{} {gaps}, the longest of {:.2} s", view.gaps, view.longest_gap_s)?;
     }
     if view.runs > 1 {
         writeln!(out, "{} runs, whose clock starts again: each is a session", view.runs)?;

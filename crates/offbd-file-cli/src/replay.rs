@@ -99,7 +99,7 @@ pub fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let verdicts: Vec<&ComparedSession> = results.iter().flatten().flatten().collect();
     match args.format {
         OutputFormat::Json => write_json(&verdicts)?,
-        OutputFormat::Table => write_table(&verdicts)?,
+        OutputFormat::Table => write_table(&verdicts, setup.settings.profile)?,
     }
     let (n, n_faulty) = (verdicts.len(), verdicts.iter().filter(|v| v.has_fault()).count());
     outcome(results)?;
@@ -197,7 +197,7 @@ fn write_json(verdicts: &[&ComparedSession]) -> anyhow::Result<()> {
     Ok(out.flush()?)
 }
 
-fn write_table(verdicts: &[&ComparedSession]) -> anyhow::Result<()> {
+fn write_table(verdicts: &[&ComparedSession], profile: Profile) -> anyhow::Result<()> {
     let mut out = output::stdout();
     if verdicts.is_empty() {
         return Ok(());
@@ -211,7 +211,7 @@ fn write_table(verdicts: &[&ComparedSession]) -> anyhow::Result<()> {
             s.samples.to_string(),
             s.rejected.to_string(),
             format!("{:.1}", s.duration_s),
-            verdict::words(session),
+            verdict::coloured(session, profile),
         ]);
     }
     for line in table::lines(&summaries) {

@@ -134,8 +134,8 @@ fn write_unknowns(
     }
 }
 
-/// Returns the token that ties a library to its model description: another list of variables
-/// has another one.
+/// Returns the token that ties a library to its model description: it changes with the list of
+/// variables.
 #[must_use]
 pub fn instantiation_token() -> String {
     let text = VARIABLES.iter().flat_map(|v| [v.name, attributes(v.role), v.unit, "\n"]);

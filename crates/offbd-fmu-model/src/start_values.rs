@@ -70,7 +70,8 @@ impl StartValues {
         for line in text.lines() {
             let (name, value) = line.split_once(' ').unwrap_or((line, ""));
             let index = VARIABLES.iter().position(|variable| variable.name == name);
-            let index = index.ok_or_else(|| Invalid::new(name, "is no variable of the model"))?;
+            let index =
+                index.ok_or_else(|| Invalid::new(name, "is not a variable of the model"))?;
             let value = value.parse().map_err(|_| Invalid::new(name, "is not a number"))?;
             found[index] = Some(value);
         }
@@ -115,7 +116,10 @@ mod tests {
         let text = chapter().to_text();
         let error = |text: &str| StartValues::parse(text).unwrap_err().to_string();
         assert_eq!(error(&text.replace("friction 0.6\n", "")), "friction: is missing");
-        assert_eq!(error(&text.replace("friction", "grip")), "grip: is no variable of the model");
+        assert_eq!(
+            error(&text.replace("friction", "grip")),
+            "grip: is not a variable of the model"
+        );
         assert_eq!(error(&text.replace("friction 0.6", "friction ?")), "friction: is not a number");
         let refused = error(&text.replace("friction 0.6", "friction NaN"));
         assert_eq!(refused, "friction: NaN is outside 0.000001 to 100");

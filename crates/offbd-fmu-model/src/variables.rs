@@ -106,7 +106,7 @@ pub const VARIABLES: [Variable; COUNT] = [
     tunable(
         "x_servo.command_gain",
         "",
-        "Angle that the x servo is asked for over its command: 0 without power, -1 if reversed",
+        "Angle asked of the x servo, as a multiple of its command: 0 without power, -1 if reversed",
         -100.0..=100.0,
     ),
     tunable("x_servo.lag", "s", "First-order lag of the x servo", 0.0..=10.0),
@@ -129,7 +129,7 @@ pub const VARIABLES: [Variable; COUNT] = [
     tunable(
         "y_servo.command_gain",
         "",
-        "Angle that the y servo is asked for over its command: 0 without power, -1 if reversed",
+        "Angle asked of the y servo, as a multiple of its command: 0 without power, -1 if reversed",
         -100.0..=100.0,
     ),
     tunable("y_servo.lag", "s", "First-order lag of the y servo", 0.0..=10.0),

@@ -67,7 +67,7 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
         c.instance.start_at(start_s)?;
         Ok(c.instance.enter_initialization()?)
     };
-    // SAFETY: the caller's contract is that of `with`.
+    // SAFETY: the caller promises what `with` requires.
     unsafe { with(instance, enter) }
 }
 
@@ -86,7 +86,7 @@ unsafe extern "C" fn fmi3GetFloat64(
         // SAFETY: the caller's contract.
         unsafe { calls::get(c, references, n_references, values) }
     };
-    // SAFETY: the caller's contract is that of `with`.
+    // SAFETY: the caller promises what `with` requires.
     unsafe { with(instance, get) }
 }
 
@@ -105,7 +105,7 @@ unsafe extern "C" fn fmi3SetFloat64(
         // SAFETY: the caller's contract.
         unsafe { calls::set(c, references, n_references, values) }
     };
-    // SAFETY: the caller's contract is that of `with`.
+    // SAFETY: the caller promises what `with` requires.
     unsafe { with(instance, set) }
 }
 
@@ -142,6 +142,6 @@ unsafe extern "C" fn fmi3DoStep(
         // SAFETY: the caller's contract.
         unsafe { put(last_s, "lastSuccessfulTime", from_s + step_s) }
     };
-    // SAFETY: the caller's contract is that of `with`.
+    // SAFETY: the caller promises what `with` requires.
     unsafe { with(instance, step) }
 }

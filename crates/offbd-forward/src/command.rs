@@ -34,9 +34,9 @@ const DEFAULT_SPOOL: &str = "offbd-spool.sqlite";
     refuses, and samples that it rejects, are set aside with the reason. On SIGINT\n\
     and SIGTERM the agent ends once all that it has read is in the spool.\n\n\
     Examples:\n  \
-    offbd forward --to https://offbd.example:8087 --token-file token \\\n      \
+    offbd forward --url https://offbd.example:8087 --token-file token \\\n      \
     --spool spool.sqlite\n  \
-    my_logger | offbd forward --to http://10.0.0.2:8087 --asset my-rig \\\n      \
+    my_logger | offbd forward --url http://10.0.0.2:8087 --asset my-rig \\\n      \
     --session monday\n  \
     offbd forward list --spool spool.sqlite\n  \
     offbd forward send-again --spool spool.sqlite 17 18")]
@@ -50,9 +50,10 @@ pub struct ForwardArgs {
 #[derive(Clone, Debug, Args)]
 struct AgentArgs {
     /// Address of the service
-    #[arg(long, value_name = "URL")]
+    #[arg(long = "url", visible_alias = "to", value_name = "URL")]
     to: String,
-    /// File with the token for the service
+    /// File with the token for the service; an empty one for a service without
+    /// tokens
     #[arg(long, value_name = "FILE")]
     token_file: Option<PathBuf>,
     /// File of the spool; created if missing
@@ -94,15 +95,16 @@ pub fn run(args: &ForwardArgs) -> anyhow::Result<()> {
     match (&args.refused, &args.agent) {
         (Some(command), _) => offbd_terminal::block_on(command.run()),
         (None, Some(args)) => forward(args),
-        (None, None) => Err(BadArgument("name the service with --to".to_owned()).into()),
+        (None, None) => Err(BadArgument("name the service with --url".to_owned()).into()),
     }
 }
 
 fn forward(args: &AgentArgs) -> anyhow::Result<()> {
     let token = args.token_file.as_deref().map(read).transpose()?;
     let token = token.map(|token| String::from_utf8_lossy(&token).trim().to_owned());
+    let token = token.filter(|token| !token.is_empty());
     let to = ServiceUrl::new(&args.to, token.as_deref())
-        .map_err(|e| BadArgument(format!("--to: {e}")))?;
+        .map_err(|e| BadArgument(format!("--url: {e}")))?;
     offbd_terminal::block_on(async {
         let spool = Spool::open(&args.spool, args.max_bytes).await;
         let spool = Arc::new(spool.map_err(|e| InputError::file(&args.spool, e))?);

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, FromRequest, Path, RawQuery, Request, State};
+use axum::body::Body;
+use axum::extract::{Path, RawQuery, Request, State};
 use axum::http::header::CONTENT_TYPE;
 use axum::middleware::{from_fn, from_fn_with_state};
 use axum::routing::{get, post};
 use axum::{Json, Router};
+use futures_util::TryStreamExt;
 use offbd_core::engine::Rig;
 use serde::Serialize;
 use tokio::time::timeout;
@@ -18,10 +19,11 @@ use super::delays::{DelayView, Delays};
 use super::refusal::{self, Refusal};
 use super::spool::{NewBatch, Spool, SpoolStatus};
 use super::strangers;
+use offbd_net::coding::{BodyError, Coding};
 use offbd_net::unread_body;
 use offbd_wire::telemetry::{AckView, Batch, RowView, TelemetryFormat};
 
-/// Longest body, bytes; a longer one is refused with 413.
+/// Longest body as it arrives, and decompressed, bytes; a longer one is refused with 413.
 const MAX_BODY_BYTES: usize = 4 << 20;
 /// Longest time until a body has arrived; then it is refused with 408.
 pub(super) const BODY_TIMEOUT: Duration = Duration::from_secs(30);
@@ -45,7 +47,6 @@ pub fn router(spool: Arc<Spool>, delays: Arc<Delays>, names: &[String]) -> Route
         .route("/api/v1/assets/{asset}/telemetry", post(take))
         .route("/api/v1/spool", get(status))
         .route("/healthz", get(|| async { Json(serde_json::json!({ "status": "ok" })) }))
-        .layer(DefaultBodyLimit::max(MAX_BODY_BYTES))
         .with_state((spool, delays));
     router.layer((
         SetRequestIdLayer::x_request_id(MakeRequestUuid),
@@ -70,13 +71,23 @@ async fn take(
     let media_type =
         header.map_or("application/json", |header| header.to_str().unwrap_or_default()).to_owned();
     let format = TelemetryFormat::of_type(&media_type)?;
-    let body = timeout(BODY_TIMEOUT, Bytes::from_request(request, &())).await;
+    let coding = Coding::of(request.headers())?;
+    let body = timeout(BODY_TIMEOUT, collect(coding, request.into_body())).await;
     let body = body.map_err(|_| Refusal::SlowBody)??;
     let parsed = format.parse(&body, MAX_BATCH_SAMPLES)?;
     Rig::chapter(&asset).check()?;
     let query = query.unwrap_or_default();
-    spool.put(&NewBatch { asset, query, media_type, body: body.into() }).await?;
+    spool.put(&NewBatch { asset, query, media_type, body }).await?;
     Ok(Json(acknowledgement(parsed)))
+}
+
+/// Returns the decoded body, which the spool keeps.
+async fn collect(coding: Coding, body: Body) -> Result<Vec<u8>, BodyError> {
+    let (mut whole, mut pieces) = (Vec::new(), coding.decode(body, MAX_BODY_BYTES));
+    while let Some(piece) = pieces.try_next().await? {
+        whole.extend_from_slice(&piece);
+    }
+    Ok(whole)
 }
 
 /// The acknowledgement of a batch in the spool. What the service alone knows is missing: its

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser};
 use offbd_forward::command::{self, ForwardArgs};
+use offbd_terminal::help;
 use offbd_terminal::logging::LoggingArgs;
 use offbd_terminal::report;
 
@@ -23,9 +24,9 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    let help = Cli::command().get_after_help().map(ToString::to_string).unwrap_or_default();
-    let named = help.replace("offbd forward", "offbd-forward");
-    let matches = Cli::command().after_help(named).get_matches();
+    let text = Cli::command().get_after_help().map(ToString::to_string).unwrap_or_default();
+    let named = text.replace("offbd forward", "offbd-forward");
+    let matches = help::described(Cli::command().after_help(named)).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     cli.logging.start("info", false, None::<tracing_subscriber::layer::Identity>);
     command::run(&cli.forward).map_or_else(|error| report(&error, false), |()| ExitCode::SUCCESS)

@@ -2,12 +2,12 @@
 
 use axum::body::Body;
 use axum::extract::Request;
-use axum::extract::rejection::BytesRejection;
 use axum::http::StatusCode;
-use axum::http::header::{CONTENT_LENGTH, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
+use axum::http::header::{ACCEPT_ENCODING, CONTENT_LENGTH, CONTENT_TYPE, HeaderValue, RETRY_AFTER};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use offbd_core::vocabulary::Invalid;
+use offbd_net::coding::{ACCEPTED_CODINGS, BodyError, UnsupportedCoding};
 use offbd_wire::problem::{self, ProblemType};
 use offbd_wire::telemetry::{BatchError, UnsupportedMediaType};
 use serde_json::{Value, json};
@@ -31,7 +31,9 @@ pub(super) enum Refusal {
     #[error(transparent)]
     Spool(#[from] SpoolError),
     #[error(transparent)]
-    Body(#[from] BytesRejection),
+    Coding(#[from] UnsupportedCoding),
+    #[error(transparent)]
+    Body(#[from] BodyError),
     #[error("the body was not received in {} s", BODY_TIMEOUT.as_secs())]
     SlowBody,
     #[error("`Host` must be an IP address, localhost, or a name that is given with --host")]
@@ -46,9 +48,8 @@ impl Refusal {
             Self::MediaType(_) => problem::MEDIA_TYPE,
             Self::Batch(BatchError::Malformed { .. }) => problem::MALFORMED,
             Self::Batch(BatchError::TooMany { .. }) => problem::TOO_LARGE,
-            Self::Body(rejection) if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE => {
-                problem::TOO_LARGE
-            }
+            Self::Coding(_) => problem::CONTENT_CODING,
+            Self::Body(BodyError::TooLong { .. }) => problem::TOO_LARGE,
             Self::Body(_) => problem::MALFORMED,
             Self::SlowBody => problem::SLOW_BODY,
             Self::Host => problem::MISDIRECTED,
@@ -86,6 +87,9 @@ impl IntoResponse for Refusal {
         headers.insert(CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
         if let Self::Spool(_) = self {
             headers.insert(RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        }
+        if let Self::Coding(_) = self {
+            headers.insert(ACCEPT_ENCODING, HeaderValue::from_static(ACCEPTED_CODINGS));
         }
         response.extensions_mut().insert(Problem(problem));
         response

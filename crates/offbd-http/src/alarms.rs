@@ -5,6 +5,7 @@ use axum::http::StatusCode;
 use axum::{Extension, Json};
 use serde::Deserialize;
 
+use super::edition::{IfMatch, Tagged, with_tag};
 use super::faults::ActorQuery;
 use super::json_body::JsonBody;
 use super::{App, AssetItemPath, AssetPath, Path, Problem, Query, page_limit, query_word};
@@ -21,7 +22,7 @@ use offbd_wire::words::{AlarmCodeWord, AlarmStateFilter};
 #[derive(Debug, Deserialize, utoipa::IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct AlarmsQuery {
-    /// `active` (failing or on record) by default.
+    /// `active` (failing, suspected or on record) by default.
     #[param(inline, value_type = Option<AlarmStateFilter>)]
     state: Option<String>,
     asset: Option<String>,
@@ -91,7 +92,8 @@ pub(super) async fn acknowledge(
     Ok(Json(app.service.acknowledge_all(request, query.actor(&caller)).await?))
 }
 
-/// Returns what to do about each kind of alarm: checks in plain words, and the owner's notes.
+/// Returns what to do about each kind of alarm: checks in plain words, and the owner's notes. A
+/// code has advice for each kind of fault, and for a fault whose kind is unknown (`kind` is null).
 #[utoipa::path(get, path = "/advice", tag = "alarms", operation_id = "list_advice",
     responses((status = 200, body = AdviceListView)))]
 pub(super) async fn advice(
@@ -100,23 +102,28 @@ pub(super) async fn advice(
     Ok(Json(service.advice().await?))
 }
 
-/// Replaces the owner's note on a code; an empty text removes it.
+/// Replaces the owner's note on a code; an empty text removes it. All users see the note beside
+/// the checks. With `If-Match` it is replaced only if nobody has changed it meanwhile.
 #[utoipa::path(put, path = "/advice/{code}/note", tag = "alarms", operation_id = "put_note",
-    params(("code" = AlarmCodeWord, description = "Code of the alarm"), ActorQuery),
+    params(("code" = AlarmCodeWord, description = "Code of the alarm"), ActorQuery,
+        ("If-Match" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
     request_body = NewNoteView,
-    responses((status = 200, body = NoteView), (status = 400, body = Problem),
+    responses((status = 200, body = NoteView, headers(("ETag"))), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub(super) async fn put_note(
     State(app): State<App>,
     Path(code): Path<String>,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
+    IfMatch(expected): IfMatch,
     JsonBody(note): JsonBody<NewNoteView>,
-) -> Result<Json<NoteView>, Problem> {
-    Ok(Json(app.service.put_note(&code, note, query.actor(&caller)).await?))
+) -> Result<Tagged<NoteView>, Problem> {
+    let note = app.service.put_note(&code, note, query.actor(&caller), &expected).await?;
+    Ok(with_tag(note.etag.clone(), note))
 }
 
-/// Lists the mutes of an asset that are in force.
+/// Lists the mutes of an asset that are in force. All are in one page. A mute that has expired is
+/// not listed.
 #[utoipa::path(get, path = "/assets/{asset}/mutes", tag = "alarms", operation_id = "list_mutes",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = Page<MuteView>), (status = 404, body = Problem)))]
@@ -132,30 +139,35 @@ pub(super) async fn mutes(
 #[utoipa::path(put, path = "/assets/{asset}/mutes/{code}", tag = "alarms",
     operation_id = "mute_monitor",
     params(("asset" = String, description = "Name of the asset"),
-        ("code" = AlarmCodeWord, description = "Code of the alarm"), ActorQuery),
+        ("code" = AlarmCodeWord, description = "Code of the alarm"), ActorQuery,
+        ("If-Match" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
     request_body = NewMuteView,
-    responses((status = 200, body = MuteView), (status = 400, body = Problem),
+    responses((status = 200, body = MuteView, headers(("ETag"))), (status = 400, body = Problem),
         (status = 404, body = Problem), (status = 422, body = Problem)))]
 pub(super) async fn mute(
     State(app): State<App>,
     AssetItemPath(asset, code): AssetItemPath,
     Query(query): Query<ActorQuery>,
     Extension(caller): Extension<Caller>,
+    IfMatch(expected): IfMatch,
     JsonBody(new): JsonBody<NewMuteView>,
-) -> Result<Json<MuteView>, Problem> {
-    Ok(Json(app.service.mute(&asset, &code, new, query.actor(&caller)).await?))
+) -> Result<Tagged<MuteView>, Problem> {
+    let mute = app.service.mute(&asset, &code, new, query.actor(&caller), &expected).await?;
+    Ok(with_tag(mute.etag.clone(), mute))
 }
 
-/// Ends the mute of a monitor.
+/// Ends the mute of a monitor. Without one, the request has no effect.
 #[utoipa::path(delete, path = "/assets/{asset}/mutes/{code}", tag = "alarms",
     operation_id = "unmute_monitor",
     params(("asset" = String, description = "Name of the asset"),
-        ("code" = AlarmCodeWord, description = "Code of the alarm")),
+        ("code" = AlarmCodeWord, description = "Code of the alarm"),
+        ("If-Match" = Option<String>, Header)),
     responses((status = 204), (status = 404, body = Problem)))]
 pub(super) async fn unmute(
     State(service): State<Service>,
     AssetItemPath(asset, code): AssetItemPath,
+    IfMatch(expected): IfMatch,
 ) -> Result<StatusCode, Problem> {
-    service.unmute(&asset, &code).await?;
+    service.unmute(&asset, &code, &expected).await?;
     Ok(StatusCode::NO_CONTENT)
 }

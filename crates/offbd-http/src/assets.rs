@@ -32,7 +32,7 @@ pub(super) struct AssetsQuery {
 /// Size limit of an asset file, bytes.
 pub(super) const MAX_ASSET_BYTES: usize = 64 << 10;
 
-/// Lists the assets by name.
+/// Lists the assets by name. Each item is an asset file with all defaults.
 #[utoipa::path(get, path = "/assets", tag = "assets", operation_id = "list_assets",
     params(AssetsQuery),
     responses((status = 200, body = Page<AssetView>), (status = 400, body = Problem)))]
@@ -43,7 +43,8 @@ pub(super) async fn list(
     Ok(Json(service.assets(name, cursor.as_deref(), page_limit(limit)).await?))
 }
 
-/// Registers an asset; the body is its asset file.
+/// Registers an asset; the body is its asset file. If the name is taken, nothing is changed and
+/// the response is 409; use PUT to replace an asset file.
 #[utoipa::path(post, path = "/assets", tag = "assets", operation_id = "create_asset",
     request_body = AssetView, responses(
         (status = 201, body = AssetView, headers(("ETag"), ("Location"))),
@@ -64,7 +65,8 @@ pub(super) async fn create(
     Ok((StatusCode::CREATED, [(LOCATION, location)], tagged(made)))
 }
 
-/// Returns the asset file with all defaults filled in.
+/// Returns the asset file with all defaults filled in. It includes the active calibration.
+/// `If-None-Match` with its `ETag` saves sending it again.
 #[utoipa::path(get, path = "/assets/{asset}", tag = "assets", operation_id = "get_asset",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = AssetView, headers(("ETag"))),
@@ -81,7 +83,7 @@ pub(super) async fn get(
 /// that it started with; the next session uses the new one.
 #[utoipa::path(put, path = "/assets/{asset}", tag = "assets", operation_id = "put_asset",
     params(("asset" = String, description = "Name of the asset"),
-        ("If-Match" = Option<String>, Header)),
+        ("If-Match" = Option<String>, Header), ("If-None-Match" = Option<String>, Header)),
     request_body = AssetView,
     responses((status = 200, body = AssetView, headers(("ETag"))),
         (status = 201, body = AssetView, headers(("ETag"))),
@@ -116,8 +118,9 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Returns the state of rig and twin after the last evaluated sample: accelerations,
-/// residual, limit, gate, fidelity, and the readiness of each monitor.
+/// Returns the state of rig and twin after the last evaluated sample: accelerations, residual,
+/// limit, gate, fidelity, and the readiness of each monitor. Without an open session `session` is
+/// null, and the twin is at rest.
 #[utoipa::path(get, path = "/assets/{asset}/state", tag = "assets", operation_id = "get_state",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = StateView), (status = 404, body = Problem)))]
@@ -130,7 +133,8 @@ pub(super) async fn state(
 
 /// Returns how the samples of a rig arrive, in its session and in the last minutes: rate and
 /// spacing on the device's clock, gaps, the delay of batches, rows sent twice, rows that are not
-/// judged and why, and how far the device's clock is from that of the service.
+/// judged and why, and how far the device's clock is from that of the service. The numbers are
+/// kept in memory: they begin at zero when the asset is loaded, and no verdict depends on them.
 #[utoipa::path(get, path = "/assets/{asset}/link", tag = "assets", operation_id = "get_link",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = LinkView), (status = 404, body = Problem)))]

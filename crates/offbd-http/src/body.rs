@@ -1,7 +1,6 @@
 //! Reading request bodies under limits of size, time and total memory.
 
 use std::collections::HashMap;
-use std::io;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::Duration;
 
@@ -12,9 +11,9 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::time::timeout;
 
 use super::Problem;
-use super::coding::Coding;
+use offbd_net::coding::Coding;
 use offbd_service::ServiceError;
-use offbd_wire::problem::{MALFORMED, SLOW_BODY, TOO_LARGE};
+use offbd_wire::problem::SLOW_BODY;
 
 /// The limit of request body bytes in memory at a time, over all requests. A request
 /// that would exceed it is answered with 429.
@@ -114,10 +113,7 @@ async fn collect(
     let mut window = ReservedBytes::default();
     let mut frames = coding.decode(body, limit);
     while let Some(frame) = frames.next().await {
-        let frame = frame.map_err(|error| incomplete(&error, coding, limit))?;
-        if read.bytes.len() + frame.len() > limit {
-            return Err(too_large(coding, limit));
-        }
+        let frame = frame?;
         let kept = coding.window().saturating_sub(read.bytes.len()).min(frame.len());
         window.add(kept, share)?;
         read.reserved.add(frame.len(), share)?;
@@ -126,23 +122,11 @@ async fn collect(
     Ok(read)
 }
 
-fn incomplete(error: &io::Error, coding: Coding, limit: usize) -> Problem {
-    if error.kind() == io::ErrorKind::FileTooLarge {
-        return too_large(Coding::Identity, limit);
+impl BudgetedBody {
+    /// Returns the bytes and what of the budget they take.
+    pub(super) fn into_parts(self) -> (Vec<u8>, ReservedBytes) {
+        (self.bytes, self.reserved)
     }
-    let detail = match coding {
-        Coding::Identity => format!("the body was not received completely: {error}"),
-        Coding::Gzip | Coding::Zstd => {
-            format!("the body was not received completely, or cannot be decompressed: {error}")
-        }
-    };
-    Problem::new(MALFORMED, detail)
-}
-
-fn too_large(coding: Coding, limit: usize) -> Problem {
-    let decoded = if coding == Coding::Identity { "" } else { ", decompressed" };
-    let detail = format!("the body is longer than {limit} bytes{decoded}");
-    Problem::new(TOO_LARGE, detail)
 }
 
 impl AsRef<[u8]> for BudgetedBody {

@@ -23,7 +23,8 @@ pub(super) struct NewCalibration {
     sessions: Vec<TrainingDataView>,
 }
 
-/// Starts a background job that calibrates the rig from healthy sessions.
+/// Starts a background job that calibrates the rig from healthy sessions. Its state and result are
+/// at `Location`. The result is used once it is activated.
 #[utoipa::path(post, path = "/assets/{asset}/calibrations", tag = "assets",
     operation_id = "calibrate",
     params(("asset" = String, description = "Name of the asset"), ActorQuery),
@@ -45,7 +46,7 @@ pub(super) async fn create(
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(job)))
 }
 
-/// Lists the calibrations, newest first.
+/// Lists the calibrations, newest first. Those that wait, run or have failed are listed too.
 #[utoipa::path(get, path = "/assets/{asset}/calibrations", tag = "assets",
     operation_id = "list_calibrations",
     params(("asset" = String, description = "Name of the asset"), PageQuery),
@@ -59,7 +60,8 @@ pub(super) async fn list(
     Ok(Json(service.calibrations(&asset, page.cursor.as_deref(), limit).await?))
 }
 
-/// Returns a calibration: its state, and its result or the reason why it failed.
+/// Returns a calibration: its state, and its result or the reason why it failed. A result holds
+/// the parameters, how far they can be trusted, and which faults it can detect after what time.
 #[utoipa::path(get, path = "/assets/{asset}/calibrations/{id}", tag = "assets",
     operation_id = "get_calibration",
     params(("asset" = String, description = "Name of the asset"),

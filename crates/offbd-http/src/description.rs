@@ -242,6 +242,12 @@ fn describe_conditions(operation: &mut Operation) {
     if let Some(parameter) = header(operation, "If-Match") {
         *parameter = condition("If-Match", "Entity tag of the edition to replace; any without it");
     }
+    if let Some(parameter) = header(operation, "If-None-Match") {
+        let schema = ObjectBuilder::new().schema_type(Type::String).enum_values(Some(["*"]));
+        *parameter =
+            condition("If-None-Match", "`*` creates what does not exist, and replaces nothing");
+        parameter.schema = Some(schema.into());
+    }
     let responses = &mut operation.responses.responses;
     let is_tagged = responses.get("200").is_some_and(|response| match response {
         RefOr::T(response) => response.headers.contains_key("ETag"),

@@ -13,14 +13,23 @@ use super::Problem;
 use offbd_service::{Edition, Expected};
 use offbd_wire::problem::MALFORMED_CONDITION;
 
-/// The edition that the request may replace: any without `If-Match`.
+/// The edition that the request may replace: any without `If-Match`, none with `If-None-Match: *`.
 pub(super) struct IfMatch(pub(super) Expected);
 
 impl<S: Send + Sync> FromRequestParts<S> for IfMatch {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
-        parsed(&parts.headers, &IF_MATCH, "`If-Match`").map(Self)
+        let matching = parsed(&parts.headers, &IF_MATCH, "`If-Match`")?;
+        let malformed = |detail| Err(Problem::new(MALFORMED_CONDITION, detail));
+        match (matching, parsed(&parts.headers, &IF_NONE_MATCH, "`If-None-Match`")?) {
+            (matching, Expected::Anything) => Ok(Self(matching)),
+            (Expected::Anything, Expected::Existing) => Ok(Self(Expected::Nothing)),
+            (_, Expected::Existing) => {
+                malformed("`If-Match` and `If-None-Match: *` cannot hold together")
+            }
+            _ => malformed("`If-None-Match` of a change must be `*`"),
+        }
     }
 }
 
@@ -41,7 +50,7 @@ impl IfNoneMatch {
         let (headers, value) = tagged;
         let tag = headers[0].1.trim_matches('"');
         let is_known = match &self.0 {
-            Expected::Anything => false,
+            Expected::Anything | Expected::Nothing => false,
             Expected::Existing => true,
             Expected::OneOf(tags) => tags.iter().any(|known| known == tag),
         };

@@ -71,7 +71,8 @@ impl ActorQuery {
     }
 }
 
-/// Lists the fault memory of an asset.
+/// Lists the fault memory of an asset. By default only active faults: pending or confirmed ones.
+/// All are in one page.
 #[utoipa::path(get, path = "/assets/{asset}/faults", tag = "faults",
     operation_id = "list_asset_faults",
     params(("asset" = String, description = "Name of the asset"), StatusQuery),
@@ -86,7 +87,8 @@ pub(super) async fn of_asset(
     Ok(Json(service.asset_faults(&asset, status).await?))
 }
 
-/// Returns the fault memory entry of one code.
+/// Returns the fault memory entry of one code. It has the status byte of ISO 14229, the evidence
+/// at the first failure, counters and times.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "get_fault",
     params(("asset" = String, description = "Name of the asset"),
@@ -99,7 +101,8 @@ pub(super) async fn get(
     Ok(Json(service.fault(&asset, &code).await?))
 }
 
-/// Clears a code: erases its fault memory entry.
+/// Clears a code: erases its fault memory entry. The recordings of the sessions and the history of
+/// the code are kept. A fault that is still there is found again.
 #[utoipa::path(delete, path = "/assets/{asset}/faults/{code}", tag = "faults",
     operation_id = "clear_fault",
     params(("asset" = String, description = "Name of the asset"),
@@ -116,7 +119,8 @@ pub(super) async fn clear(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Acknowledges the current occurrence of a code.
+/// Acknowledges the current occurrence of a code. An acknowledged fault stays on record; its next
+/// occurrence needs another acknowledgement.
 #[utoipa::path(post, path = "/assets/{asset}/faults/{code}/acknowledge", tag = "faults",
     operation_id = "acknowledge_fault",
     params(("asset" = String, description = "Name of the asset"),
@@ -187,8 +191,8 @@ pub(super) async fn recording(
     Ok(([(CONTENT_TYPE, session_format::content_type(format))], text).into_response())
 }
 
-/// Lists the history of a code, newest first: its transitions, and who acknowledged or
-/// cleared it.
+/// Lists the history of a code, newest first: its transitions, and who acknowledged or cleared it.
+/// It is kept when the code is cleared.
 #[utoipa::path(get, path = "/assets/{asset}/faults/{code}/history", tag = "faults",
     operation_id = "get_fault_history",
     params(("asset" = String, description = "Name of the asset"),
@@ -205,7 +209,8 @@ pub(super) async fn history(
     Ok(Json(service.history(&asset, &code, page.cursor.as_deref(), limit).await?))
 }
 
-/// Lists the faults of the fleet.
+/// Lists the faults of the fleet. By default only active faults: pending or confirmed ones. The
+/// other parameters select by asset, code and acknowledgement, and sort.
 #[utoipa::path(get, path = "/faults", tag = "faults", operation_id = "list_faults",
     params(FleetFaultsQuery),
     responses((status = 200, body = Page<FaultEntryView>), (status = 400, body = Problem),

@@ -23,8 +23,8 @@ use sha2::{Digest, Sha256};
 
 use super::Problem;
 use super::assets::MAX_ASSET_BYTES;
-use super::coding::Coding;
 use super::credential::client_address;
+use offbd_net::coding::Coding;
 use offbd_service::{Route, Service, ServiceError};
 use offbd_wire::problem::TOO_LARGE;
 
@@ -37,8 +37,8 @@ const CLIENT: HeaderName = HeaderName::from_static("x-offbd-client");
 /// The header of a forwarded request that carries a batch from NATS or MQTT.
 pub(super) const FROM_BUS: HeaderName = HeaderName::from_static("x-offbd-from-bus");
 
-/// How long the answer of a node is waited for that owns the asset no more. Chosen: much longer
-/// than an answer takes that is under way.
+/// How long the service waits for the answer of a node that no longer owns the asset. Chosen: longer
+/// by far than an answer that is under way takes.
 const LAST_ANSWERS: Duration = Duration::from_secs(1);
 
 /// Longest time to connect to another node. Chosen: the first packet is sent again after 1 s and
@@ -46,7 +46,7 @@ const LAST_ANSWERS: Duration = Duration::from_secs(1);
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Longest time that what was sent to another node stays unacknowledged, and that a connection
-/// stays silent although it is probed. Then it is given up: its packets may vanish without a word,
+/// stays silent although it is probed. Then it is given up: its packets may vanish silently,
 /// while the node reaches the database and owns what it owned. As for connections to PostgreSQL
 /// (`crates/offbd-store/src/writer_lock.rs`). A node that reads nothing for so long although more is sent than
 /// the buffers hold loses the connection too.
@@ -250,7 +250,7 @@ fn upgraded(
         let (Ok(client), Ok(owner)) = tokio::join!(client, owner) else { return };
         let (mut client, mut owner) = (TokioIo::new(client), TokioIo::new(owner));
         tokio::select! {
-            // Ends when one side is gone, which is no error.
+            // Ends when one side is gone, which is not an error.
             _ = tokio::io::copy_bidirectional(&mut client, &mut owner) => {}
             () = moved => {}
         }

@@ -9,8 +9,9 @@ use offbd_service::Service;
 use offbd_service::access::Caller;
 use offbd_wire::learning::LearningView;
 
-/// Returns the progress of the automatic calibration: the motion gathered so far, what is
-/// missing, the calibration that waits to be accepted, or the sessions it was learnt from.
+/// Returns the progress of the automatic calibration: the motion gathered so far, what is missing,
+/// the calibration that waits to be accepted, or the sessions it was learnt from. Samples that are
+/// not stored yet are included if the asset is loaded.
 #[utoipa::path(get, path = "/assets/{asset}/learning", tag = "assets",
     operation_id = "get_learning",
     params(("asset" = String, description = "Name of the asset")),

@@ -15,7 +15,6 @@ mod asyncapi;
 mod body;
 mod calibrations;
 mod cluster;
-mod coding;
 mod credential;
 mod deliver;
 mod description;
@@ -28,6 +27,7 @@ mod forward;
 mod gather;
 mod guard;
 mod headers;
+mod import_files;
 mod jobs;
 mod json_body;
 mod json_schema;
@@ -100,7 +100,7 @@ pub struct App {
     pub policy: Arc<AccessPolicy>,
     /// Cancelled when the server stops; long-lived responses end then.
     pub closing: CancellationToken,
-    /// Whether this is the demo, which adds routes of its own.
+    /// Whether this is the demo, which adds its own routes.
     pub demo: bool,
     /// The optional parts of this build, by the names of the program's features.
     pub features: &'static [&'static str],
@@ -136,7 +136,7 @@ impl FromRef<App> for Service {
         (name = "telemetry", description = "Ingest of samples"),
         (name = "faults", description = "Fault memory"),
         (name = "alarms", description = "What fails in the fleet, mutes, and what to do"),
-        (name = "notifications", description = "Who is told of it: channels, rules, deliveries"),
+        (name = "notifications", description = "Channels, rules and deliveries of messages about faults"),
         (name = "sessions", description = "Recordings"),
         (name = "sovd", description = "The same in the shape of SOVD (ISO 17978-3)"),
         (name = "access", description = "Tokens, logins, the audit log"),

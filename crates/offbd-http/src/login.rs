@@ -42,8 +42,9 @@ fn view(caller: &Caller) -> CallerView {
     }
 }
 
-/// Logs a browser in: the response sets a cookie that authenticates as the token for one
-/// week, or until the token expires or is revoked.
+/// Logs a browser in: the response sets a cookie that authenticates as the token for one week, or
+/// until the token expires or is revoked. Programs need no login: they send their token in
+/// `Authorization`.
 #[utoipa::path(post, path = "/login", tag = "access", operation_id = "log_in",
     request_body = NewLogin,
     responses((status = 200, body = CallerView, headers(("Set-Cookie"))), (status = 400, body = Problem),
@@ -70,14 +71,15 @@ pub(super) async fn log_in(State(app): State<App>, request: Request) -> Result<R
     Ok((cookie, Json(view(&caller))).into_response())
 }
 
-/// Returns the identity of the caller: token name, role and asset.
+/// Returns the identity of the caller: token name, role and asset. Without authentication
+/// everybody has the role `admin`.
 #[utoipa::path(get, path = "/login", tag = "access", operation_id = "get_login",
     responses((status = 200, body = CallerView)))]
 pub(super) async fn get(Extension(caller): Extension<Caller>) -> Json<CallerView> {
     Json(view(&caller))
 }
 
-/// Logs a browser out and invalidates its cookie.
+/// Logs a browser out and invalidates its cookie. The token stays valid.
 #[utoipa::path(delete, path = "/login", tag = "access", operation_id = "log_out",
     responses((status = 204, headers(("Set-Cookie")))))]
 pub(super) async fn log_out(

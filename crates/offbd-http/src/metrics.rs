@@ -268,7 +268,8 @@ fn combinations(labels: &[Label]) -> Vec<Vec<metrics::Label>> {
     })
 }
 
-/// Returns the metrics in the text format of Prometheus.
+/// Returns the metrics in the text format of Prometheus. `docs/operations/monitoring.md` explains
+/// each of them.
 #[utoipa::path(get, path = "/metrics", tag = "operation",
     responses((status = 200, body = String, content_type = "text/plain")))]
 pub(super) async fn metrics(State(app): State<App>) -> impl IntoResponse {

@@ -27,7 +27,7 @@ fn given<T>(body: JsonBody<Option<T>>) -> Result<T, Problem> {
     body.0.ok_or_else(|| Invalid::new("", "the body is empty").into())
 }
 
-/// Lists the channels of notifications, without their secrets.
+/// Lists the channels of notifications, without their secrets. All are in one page.
 #[utoipa::path(get, path = "/notifications/channels", tag = "notifications",
     operation_id = "list_channels", responses((status = 200, body = Page<ChannelView>)))]
 pub(super) async fn channels(
@@ -52,7 +52,8 @@ pub(super) async fn create_channel(
     Ok((StatusCode::CREATED, [(LOCATION, location)], Json(made)))
 }
 
-/// Returns a channel, without its secrets.
+/// Returns a channel, without its secrets. Its `ETag` is for `If-Match` when it is replaced or
+/// deleted.
 #[utoipa::path(get, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "get_channel", params(("channel" = String, description = "Id of the channel")),
     responses((status = 200, body = ChannelView, headers(("ETag"))),
@@ -85,7 +86,8 @@ pub(super) async fn put_channel(
     Ok(with_tag(made.channel.etag.clone(), made))
 }
 
-/// Deletes a channel with its deliveries.
+/// Deletes a channel with its deliveries. A channel that a rule uses is not deleted: the response
+/// is 409.
 #[utoipa::path(delete, path = "/notifications/channels/{channel}", tag = "notifications",
     operation_id = "delete_channel",
     params(("channel" = String, description = "Id of the channel"),
@@ -116,14 +118,15 @@ pub(super) async fn test(
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(delivery)))
 }
 
-/// Lists the rules in the order of their creation.
+/// Lists the rules in the order of their creation. All are in one page.
 #[utoipa::path(get, path = "/notifications/rules", tag = "notifications",
     operation_id = "list_rules", responses((status = 200, body = Page<RuleView>)))]
 pub(super) async fn rules(State(service): State<Service>) -> Result<Json<Page<RuleView>>, Problem> {
     Ok(whole(service.rules().await?))
 }
 
-/// Creates a rule, which is for the changes from now on.
+/// Creates a rule, which is for the changes from now on. It selects changes by asset, tag and
+/// code, and names the channel that gets a message of each.
 #[utoipa::path(post, path = "/notifications/rules", tag = "notifications",
     operation_id = "create_rule", request_body = NewRuleView,
     responses((status = 201, body = RuleView, headers(("Location"))), (status = 400, body = Problem),
@@ -138,7 +141,7 @@ pub(super) async fn create_rule(
     Ok((StatusCode::CREATED, [(LOCATION, location)], Json(rule)))
 }
 
-/// Returns a rule.
+/// Returns a rule. Its `ETag` is for `If-Match` when it is replaced or deleted.
 #[utoipa::path(get, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "get_rule", params(("rule" = String, description = "Id of the rule")),
     responses((status = 200, body = RuleView, headers(("ETag"))),
@@ -152,7 +155,7 @@ pub(super) async fn rule(
     Ok(known.answer(with_tag(rule.etag.clone(), rule)))
 }
 
-/// Replaces a rule.
+/// Replaces a rule. The body is the whole rule; an element that is left out has its default again.
 #[utoipa::path(put, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "put_rule", params(("rule" = String, description = "Id of the rule"),
         ("If-Match" = Option<String>, Header)),
@@ -170,7 +173,7 @@ pub(super) async fn put_rule(
     Ok(with_tag(rule.etag.clone(), rule))
 }
 
-/// Deletes a rule, with its reminders.
+/// Deletes a rule, with its reminders. Its channel is kept.
 #[utoipa::path(delete, path = "/notifications/rules/{rule}", tag = "notifications",
     operation_id = "delete_rule", params(("rule" = String, description = "Id of the rule"),
         ("If-Match" = Option<String>, Header)),
@@ -213,7 +216,8 @@ pub(super) async fn deliveries(
     Ok(Json(service.deliveries(query, page_limit(limit)).await?))
 }
 
-/// Returns a delivery.
+/// Returns a delivery. It has the number of attempts, the error of the last one, and the time of
+/// the next.
 #[utoipa::path(get, path = "/notifications/deliveries/{delivery}", tag = "notifications",
     operation_id = "get_delivery",
     params(("delivery" = String, description = "Id of the delivery")),

@@ -36,14 +36,16 @@ fn healthy(app: &App) -> Json<HealthView> {
     Json(HealthView { status: "ok", version, demo, rebuilding, features, message_links })
 }
 
-/// Liveness: succeeds while the process runs.
+/// Liveness: succeeds while the process runs. It does not ask the database, so that an outage does
+/// not restart the process.
 #[utoipa::path(get, path = "/healthz", tag = "operation",
     responses((status = 200, body = HealthView)))]
 pub(super) async fn healthz(State(app): State<App>) -> Json<HealthView> {
     healthy(&app)
 }
 
-/// Readiness: succeeds if the service can accept telemetry now.
+/// Readiness: succeeds if the service can accept telemetry now. It fails while the database is
+/// unavailable, while ingest is stalled, and during shutdown.
 #[utoipa::path(get, path = "/readyz", tag = "operation",
     responses((status = 200, body = HealthView),
         (status = 503, body = Problem, description = "Not ready; `detail` has the reason")))]

@@ -81,7 +81,7 @@ fn is_client_route(path: &str, headers: &HeaderMap) -> bool {
 /// Largest page of the API's description that is changed, bytes. Its own are below 2 kB.
 const MAX_DOCS: usize = 100_000;
 
-/// Gives the page of the API's description a title of its own and a link to the dashboard.
+/// Gives the page of the API's description its own title and a link to the dashboard.
 pub(super) async fn named_docs(response: Response) -> Response {
     let is_html = |value: &HeaderValue| value.as_bytes().starts_with(b"text/html");
     if !response.headers().get(CONTENT_TYPE).is_some_and(is_html) {

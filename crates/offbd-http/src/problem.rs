@@ -10,9 +10,9 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::coding::ACCEPTED_CODINGS;
 use super::retry::retry_after_s;
 use offbd_core::vocabulary::Invalid;
+use offbd_net::coding::{ACCEPTED_CODINGS, BodyError, UnsupportedCoding};
 use offbd_service::{EntityTag, RETRY_AFTER_S, ServiceError};
 use offbd_wire::problem::{self as types, ProblemType};
 use offbd_wire::sovd::SovdErrorView;
@@ -119,6 +119,22 @@ impl IntoResponse for Problem {
         }
         response.extensions_mut().insert(self);
         response
+    }
+}
+
+impl From<UnsupportedCoding> for Problem {
+    fn from(error: UnsupportedCoding) -> Self {
+        Self::new(types::CONTENT_CODING, error.to_string())
+    }
+}
+
+impl From<BodyError> for Problem {
+    fn from(error: BodyError) -> Self {
+        let kind = match error {
+            BodyError::TooLong { .. } => types::TOO_LARGE,
+            BodyError::Incomplete(_) | BodyError::Undecodable(_) => types::MALFORMED,
+        };
+        Self::new(kind, error.to_string())
     }
 }
 

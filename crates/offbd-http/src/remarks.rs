@@ -12,7 +12,7 @@ use offbd_service::access::Caller;
 use offbd_wire::remark::{NewRemarkView, RemarkView};
 use offbd_wire::service::Page;
 
-/// Lists the remarks on a session, in order of time; all of them.
+/// Lists the remarks on a session, in order of time; all of them. A session has at most 500.
 #[utoipa::path(get, path = "/sessions/{id}/remarks", tag = "sessions",
     operation_id = "list_remarks",
     params(("id" = String, description = "The service's id of the session")),
@@ -44,7 +44,7 @@ pub(super) async fn add(
     Ok((StatusCode::CREATED, Json(remark)))
 }
 
-/// Removes a remark.
+/// Removes a remark. The session and its recording are not changed.
 #[utoipa::path(delete, path = "/sessions/{id}/remarks/{remark}", tag = "sessions",
     operation_id = "remove_remark",
     params(("id" = String, description = "The service's id of the session"),

@@ -30,8 +30,9 @@ pub(super) async fn create(
     Ok((StatusCode::ACCEPTED, [(LOCATION, location)], Json(replay)))
 }
 
-/// Returns the progress of a replay and, once it is done, its verdict, the verdict's hash,
-/// and the differences from the recorded verdict.
+/// Returns the progress of a replay and, once it is done, its verdict, the verdict's hash, and the
+/// differences from the recorded verdict. `progress` is the share of the recording that is judged,
+/// and `error` tells why a replay failed.
 #[utoipa::path(get, path = "/replays/{id}", tag = "sessions", operation_id = "get_replay",
     params(("id" = String, description = "Id of the replay")),
     responses((status = 200, body = ReplayView), (status = 404, body = Problem)))]

@@ -90,8 +90,9 @@ pub(super) struct AnnotationsQuery {
     limit: Option<u32>,
 }
 
-/// Lists fault transitions as marks on a chart, the latest first, with the fields that
-/// Grafana expects of an annotation.
+/// Lists fault transitions as marks on a chart, the latest first, with the fields that Grafana
+/// expects of an annotation. The service does not judge again: these are the stored transitions,
+/// at most `limit`.
 #[utoipa::path(get, path = "/annotations", tag = "faults", operation_id = "list_annotations",
     params(AnnotationsQuery),
     responses((status = 200, body = Vec<AnnotationView>), (status = 400, body = Problem),

@@ -75,7 +75,7 @@ pub(super) const fn content_type(format: SessionFormat) -> &'static str {
 /// for a file that says nothing of itself, whose first bytes tell.
 ///
 /// # Errors
-/// 415 if it is no format of session files, or this build does not have it.
+/// 415 if it is not a format of session files, or this build does not have it.
 pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Problem> {
     let Some(header) = headers.get(CONTENT_TYPE) else { return Ok(Some(SessionFormat::Csv)) };
     let text = header.to_str().unwrap_or_default();
@@ -93,7 +93,7 @@ pub(super) fn of_file(headers: &HeaderMap) -> Result<Option<SessionFormat>, Prob
         _ => {
             let formats = list(&SessionFormat::ALL);
             return Err(unsupported(format!(
-                "`{text}` is no media type of an imported recording; use {formats}"
+                "`{text}` is not a media type of an imported recording; use {formats}"
             )));
         }
     };

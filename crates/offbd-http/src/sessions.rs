@@ -1,7 +1,6 @@
 //! `/sessions`: opening, ending, importing, listing and exporting sessions.
 
 use std::collections::HashMap;
-use std::io::Cursor;
 
 use axum::body::{Body, Bytes};
 use axum::extract::State;
@@ -14,6 +13,7 @@ use serde::Deserialize;
 
 use super::body::BodyShare;
 use super::gather::Gathering;
+use super::import_files::{BodyKind, File};
 use super::json_body::JsonBody;
 use super::session_format::BinaryFile;
 use super::{
@@ -76,12 +76,15 @@ pub(super) struct SessionsQuery {
 pub(super) struct ImportQuery {
     /// Name of the session; the time of the import by default.
     name: Option<String>,
-    /// Which columns of a text or a sheet are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
+    /// Whether the files of a form are one recording, in the order of their times; they must not
+    /// overlap. A form with several files is refused otherwise.
+    join: Option<bool>,
+    /// Which columns are which quantities, such as `t_s=time/ms, x_m=ball_x/mm`: a sum of
     /// columns and constants for each, with `*NUMBER`, `/NUMBER` or `/UNIT` behind a column. By
     /// default, those of the asset file or the columns with the names of the quantities;
     /// `QUANTITY=none` leaves one out.
     columns: Option<String>,
-    /// Rows a second of a text without a time.
+    /// Rows a second of a file without a time.
     #[param(minimum = 0.001, maximum = 1000000)]
     rate: Option<f64>,
     /// Whether to import nothing, and to answer what the file holds and how its columns are
@@ -89,7 +92,30 @@ pub(super) struct ImportQuery {
     dry_run: Option<bool>,
 }
 
+/// The files of an import, for the description of the interface.
+#[derive(utoipa::ToSchema)]
+#[expect(dead_code, reason = "only its schema is used")]
+pub(super) struct ImportForm {
+    /// The files.
+    file: Vec<BinaryFile>,
+}
+
 impl ImportQuery {
+    /// Checks that this request may have `files`.
+    fn check(&self, files: &[File]) -> Result<(), Problem> {
+        let (n, is_joined) = (files.len(), self.join == Some(true));
+        if n > 1 && self.dry_run == Some(true) {
+            let reason = format!("inspects one file at a time; the form has {n}");
+            return Err(Invalid::new("?dry_run", reason).into());
+        }
+        if n > 1 && !is_joined {
+            let reason =
+                format!("must be true: the form has {n} files, which are one recording then");
+            return Err(Invalid::new("?join", reason).into());
+        }
+        Ok(())
+    }
+
     fn options(&self) -> Result<TableOptions, Problem> {
         let columns = self.columns.as_deref().unwrap_or_default();
         let columns = columns
@@ -148,7 +174,8 @@ pub(super) async fn open(
 /// numeric type, MCAP with JSON messages of the schema `offbd.Sample`, the first sheet of an Excel
 /// workbook, in which a time may be a date, or a JSON document with rows or columns. A text may have
 /// any usual encoding, separator and decimal sign, comments and lines before the table; other names,
-/// units and a missing time of a text, a sheet or a JSON document are given by `columns` and `rate`.
+/// units and a missing time are given by `columns` and `rate`. A form (`multipart/form-data`) has one
+/// file, or with `join` several that are one recording.
 /// If its clock starts again, each run becomes a session. Its samples are processed like live
 /// telemetry. The asset's open session is ended first, and the new session is ended after
 /// the last row; live telemetry of the asset gets 429 until then. Two files are read at a time,
@@ -162,7 +189,8 @@ pub(super) async fn open(
         (BinaryFile = "application/vnd.apache.parquet"),
         (BinaryFile = "application/vnd.apache.arrow.stream"),
         (BinaryFile = "application/vnd.mcap"),
-        (BinaryFile = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"))),
+        (BinaryFile = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"),
+        (ImportForm = "multipart/form-data"))),
     responses((status = 201, body = ImportView, headers(("Location"))),
         (status = 200, body = InspectionView, description = "With `dry_run`"),
         (status = 400, body = Problem),
@@ -176,7 +204,7 @@ pub(super) async fn import(
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, Problem> {
-    let format = session_format::of_file(&headers)?;
+    let kind = BodyKind::of(&headers)?;
     let options = query.options()?;
     let is_dry_run = query.dry_run == Some(true);
     let options = match app.service.asset(&asset).await {
@@ -187,11 +215,13 @@ pub(super) async fn import(
     let limits = &app.service.limits().requests;
     let timeout = limits.body_timeout() * IMPORT_TIMEOUT_FACTOR;
     let read = body::read(&headers, body, limits.import_bytes, timeout, &share).await?;
-    let (file, limit) = (Cursor::new(read), MAX_IMPORT_ROWS);
-    if is_dry_run {
-        return Ok(Json(app.service.inspect(file, options).await?).into_response());
+    let mut files = kind.files(read, &share).await?;
+    query.check(&files)?;
+    if is_dry_run && let Some(file) = files.pop() {
+        return Ok(Json(app.service.inspect(file.source, options).await?).into_response());
     }
-    let imported = app.service.import(&asset, query.name, file, format, options, limit).await?;
+    let (name, limit) = (query.name, MAX_IMPORT_ROWS);
+    let imported = app.service.import(&asset, name, files, options, limit).await?;
     Ok(created(&imported.session.id.clone(), imported).into_response())
 }
 
@@ -234,7 +264,8 @@ fn take_latest(sessions: &mut [SessionView], known: impl Iterator<Item = Session
     }
 }
 
-/// Returns a session, with its verdict if it has ended.
+/// Returns a session, with its verdict if it has ended. The verdict names the faults, and for each
+/// monitor how long it has judged.
 #[utoipa::path(get, path = "/sessions/{id}", tag = "sessions", operation_id = "get_session",
     params(("id" = String, description = "The service's id of the session")),
     responses((status = 200, body = SessionView), (status = 404, body = Problem)))]
@@ -246,7 +277,7 @@ pub(super) async fn get(
 }
 
 /// Returns the calibration that a session is judged with: that of the rig when the session was
-/// opened, whatever has been activated since.
+/// opened, whatever has been activated since. `calibration` is null if the rig was not calibrated.
 #[utoipa::path(get, path = "/sessions/{id}/calibration", tag = "sessions",
     operation_id = "get_session_calibration",
     params(("id" = String, description = "The service's id of the session")),
@@ -326,7 +357,8 @@ pub(super) async fn telemetry(
     Ok(([(CONTENT_TYPE, kind), (CONTENT_DISPOSITION, file)], body).into_response())
 }
 
-/// Lists the fault transitions of a session, in order.
+/// Lists the fault transitions of a session, in order. Each transition has the time on the
+/// device's clock and the evidence.
 #[utoipa::path(get, path = "/sessions/{id}/faults", tag = "sessions",
     operation_id = "list_session_faults",
     params(("id" = String, description = "The service's id of the session"), PageQuery),

@@ -484,7 +484,7 @@ impl StreamConnection {
     }
 }
 
-/// A frame from the service that is no event.
+/// A frame from the service that is not an event.
 #[derive(Debug, Serialize, ToSchema)]
 #[serde(tag = "type", rename_all = "lowercase")]
 pub(super) enum StreamFrameView {

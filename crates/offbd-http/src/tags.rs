@@ -11,7 +11,8 @@ use offbd_service::Service;
 use offbd_wire::service::Page;
 use offbd_wire::tag::{TagUseView, TagsView};
 
-/// Lists the tags in use, in alphabetical order, each with the number of its assets.
+/// Lists the tags in use, in alphabetical order, each with the number of its assets. A tag that no
+/// asset has any more is not listed.
 #[utoipa::path(get, path = "/tags", tag = "assets", operation_id = "list_tags",
     params(PageQuery),
     responses((status = 200, body = Page<TagUseView>), (status = 400, body = Problem)))]
@@ -22,7 +23,8 @@ pub(super) async fn list(
     Ok(Json(service.tags_in_use(cursor.as_deref(), page_limit(limit)).await?))
 }
 
-/// Returns the tags of an asset, in alphabetical order.
+/// Returns the tags of an asset, in alphabetical order. Their `ETag` is for `If-Match` when they
+/// are replaced.
 #[utoipa::path(get, path = "/assets/{asset}/tags", tag = "assets", operation_id = "get_tags",
     params(("asset" = String, description = "Name of the asset")),
     responses((status = 200, body = TagsView, headers(("ETag"))),

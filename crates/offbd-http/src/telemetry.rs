@@ -42,7 +42,7 @@ pub(super) struct SessionQuery {
 ///
 /// Without a session name the samples are added to the asset's open session, or to a new
 /// one: two conflicting samples in a row, or two whose clock has gone back by more than
-/// 10 s to times that are no gap of the recording, show that the device has restarted, and
+/// 10 s to times that are not a gap of the recording, show that the device has restarted, and
 /// a new session is opened; a device without session names should therefore wait for the
 /// acknowledgement of its first batch after it has started. A session name other than that
 /// of the open session ends the open session and opens one of that name.

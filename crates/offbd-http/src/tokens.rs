@@ -31,7 +31,7 @@ fn new_token(view: NewTokenView) -> Result<NewToken, Invalid> {
             headers(("Location"))),
         (status = 400, body = Problem),
         (status = 404, body = Problem, description = "No such asset"),
-        (status = 409, body = Problem, description = "A token of this name is in force"),
+        (status = 409, body = Problem, description = "A valid token of this name exists"),
         (status = 422, body = Problem)))]
 pub(super) async fn create(
     State(app): State<App>,
@@ -45,7 +45,8 @@ pub(super) async fn create(
     Ok((StatusCode::CREATED, [(LOCATION, location)], Json(created)))
 }
 
-/// Lists the tokens, newest first, including revoked ones, without their secrets.
+/// Lists the tokens, newest first, including revoked ones, without their secrets. The store keeps
+/// only hashes of secrets.
 #[utoipa::path(get, path = "/tokens", tag = "access", operation_id = "list_tokens",
     params(PageQuery),
     responses((status = 200, body = Page<TokenView>), (status = 400, body = Problem)))]
@@ -56,7 +57,8 @@ pub(super) async fn list(
     Ok(Json(service.tokens(page.cursor.as_deref(), page_limit(page.limit)).await?))
 }
 
-/// Returns a token, without its secret.
+/// Returns a token, without its secret. It has the role, the asset, who created it, and when it
+/// was last used, expires or was revoked.
 #[utoipa::path(get, path = "/tokens/{token}", tag = "access", operation_id = "get_token",
     params(("token" = String, description = "Id of the token")),
     responses((status = 200, body = TokenView), (status = 404, body = Problem)))]
@@ -67,7 +69,8 @@ pub(super) async fn get(
     Ok(Json(service.token(&token).await?))
 }
 
-/// Revokes a token and ends its logins and streams.
+/// Revokes a token and ends its logins and streams. It stays in the list. A revoked token is not
+/// changed.
 #[utoipa::path(delete, path = "/tokens/{token}", tag = "access", operation_id = "revoke_token",
     params(("token" = String, description = "Id of the token")),
     responses((status = 204), (status = 404, body = Problem)))]

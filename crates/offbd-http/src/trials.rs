@@ -62,8 +62,7 @@ impl TriedSettingsQuery {
 }
 
 /// Counts what the monitors would find in a session with other limits and debounce times. The
-/// whole recording is judged by itself, without what was remembered of earlier sessions;
-/// nothing is stored or changed.
+/// whole recording is judged on its own, ignoring earlier sessions; nothing is stored or changed.
 #[utoipa::path(get, path = "/sessions/{id}/trial", tag = "sessions",
     operation_id = "try_settings",
     params(("id" = String, description = "The service's id of the session"),

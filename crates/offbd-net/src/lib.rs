@@ -1,6 +1,7 @@
-//! What clients and servers of offbd share beside their interfaces: the HTTPS client, the
-//! rest of a refused body, and logs that name each reason once.
+//! What clients and servers of offbd share beside their interfaces: the HTTPS client,
+//! compressed bodies, the rest of a refused body, and logs that name each reason once.
 
+pub mod coding;
 mod https;
 mod reasons;
 pub mod unread_body;

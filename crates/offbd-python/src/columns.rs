@@ -1,14 +1,15 @@
 //! Tables that come from Python: anything with the Arrow PyCapsule interface (tables of
 //! pandas, polars, pyarrow, DuckDB), or a dictionary of columns (NumPy arrays, lists).
 //!
-//! The columns are those of a session file: `t_s`, `cmd_qx_rad`, `cmd_qy_rad`, `x_m`, `y_m`
-//! and optionally `seq`; others are ignored. Null and NaN are missing values. Numbers of other
+//! The samples are read from the columns of a session: `t_s`, `cmd_qx_rad`, `cmd_qy_rad`, `x_m`,
+//! `y_m` and optionally `seq`; others are ignored. Null and NaN are missing values. Numbers of other
 //! types than 64-bit floats are converted. The batches of a stream are read one after the
 //! other, so that a long recording need not be in memory.
 
 #![expect(unsafe_code, reason = "the Arrow PyCapsule interface passes pointers")]
 
 use std::ffi::CStr;
+use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::ffi::{FFI_ArrowArray, FFI_ArrowSchema, from_ffi};
@@ -17,11 +18,13 @@ use arrow_array::types::{
     ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
     UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, Float64Array, RecordBatch, StructArray, UInt64Array};
+use arrow_array::{
+    Array, ArrayRef, Float64Array, RecordBatch, StringArray, StructArray, UInt64Array,
+};
 use arrow_schema::{ArrowError, DataType};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyMapping};
+use pyo3::types::{PyCapsule, PyMapping, PyString};
 
 use crate::table::STREAM;
 use offbd_core::vocabulary::Sample;
@@ -34,10 +37,12 @@ pub(crate) enum ColumnError {
     Missing(&'static str),
     #[error("the column `{column}` has the type {data_type}, which is not a number")]
     NotNumbers { column: &'static str, data_type: DataType },
-    #[error("the column `seq` has {value} in row {row}, which is no whole number from 0 on")]
+    #[error("the column `seq` has {value} in row {row}, which is not a whole number from 0 on")]
     NotSeq { value: f64, row: usize },
-    #[error("the columns `t_s` and `{column}` have different lengths, {expected} and {found}")]
-    Lengths { column: &'static str, expected: usize, found: usize },
+    #[error("the column `{0}` is neither numbers nor text in one dimension")]
+    NotValues(String),
+    #[error("the columns `{first}` and `{column}` have different lengths, {expected} and {found}")]
+    Lengths { first: String, column: String, expected: usize, found: usize },
     #[error("the source of the recording failed: {0}")]
     Source(#[from] ArrowError),
 }
@@ -65,26 +70,6 @@ impl SampleColumns {
         let [t, qx, qy, x, y] = COLUMNS;
         let seq = batch.column_by_name("seq").map(|column| whole_numbers(column)).transpose()?;
         Ok(Self { seq, numbers: [column(t)?, column(qx)?, column(qy)?, column(x)?, column(y)?] })
-    }
-
-    /// Takes the columns of a mapping from their names.
-    pub(crate) fn of_mapping(columns: &Bound<'_, PyMapping>) -> PyResult<Self> {
-        let column = |name: &'static str| match columns.contains(name)? {
-            true => python_floats(name, &columns.get_item(name)?),
-            false => Err(ColumnError::Missing(name).into()),
-        };
-        let [t, qx, qy, x, y] = COLUMNS;
-        let numbers = [column(t)?, column(qx)?, column(qy)?, column(x)?, column(y)?];
-        let seq = if columns.contains("seq")? { Some(column("seq")?) } else { None };
-        let expected = numbers[0].len();
-        let named = COLUMNS.into_iter().zip(&numbers).chain(seq.iter().map(|seq| ("seq", seq)));
-        for (column, found) in named.map(|(name, column)| (name, column.len())) {
-            if found != expected {
-                return Err(ColumnError::Lengths { column, expected, found }.into());
-            }
-        }
-        let seq = seq.map(|seq| whole_numbers(&seq)).transpose()?;
-        Ok(Self { seq, numbers })
     }
 
     /// Calls `take` with each sample, in the order of the rows.
@@ -163,23 +148,48 @@ fn whole_numbers(array: &dyn Array) -> Result<UInt64Array, ColumnError> {
     (0..numbers.len()).map(whole).collect()
 }
 
-/// Returns a column of a mapping. A NumPy array is copied at once, because other threads may
-/// change it while it is judged; anything else is taken number by number.
-fn python_floats(name: &'static str, column: &Bound<'_, PyAny>) -> PyResult<Float64Array> {
-    let wrong = |error: PyErr| PyValueError::new_err(format!("the column `{name}`: {error}"));
-    if !column.hasattr("dtype")? || !column.hasattr("tobytes")? {
-        return column.extract::<Vec<Option<f64>>>().map(Float64Array::from).map_err(wrong);
+/// Returns the columns of a mapping from their names; those of neither numbers nor text are left out.
+pub(crate) fn batch_of_mapping(columns: &Bound<'_, PyMapping>) -> PyResult<RecordBatch> {
+    let mut fields: Vec<(String, ArrayRef)> = Vec::new();
+    for item in columns.items()? {
+        let (name, values): (Bound<'_, PyAny>, Bound<'_, PyAny>) = item.extract()?;
+        let Ok(name) = name.extract::<String>() else { continue };
+        let column = match python_column(&values)? {
+            Some(column) => column,
+            None if COLUMNS.contains(&name.as_str()) => {
+                return Err(ColumnError::NotValues(name).into());
+            }
+            None => continue,
+        };
+        if let Some((first, expected)) = fields.first().filter(|(_, c)| c.len() != column.len()) {
+            let (first, expected, found) = (first.clone(), expected.len(), column.len());
+            return Err(ColumnError::Lengths { first, column: name, expected, found }.into());
+        }
+        fields.push((name, column));
     }
-    let column = column.call_method1("astype", ("<f8",)).map_err(wrong)?;
-    let n_dimensions: usize = column.getattr("ndim")?.extract()?;
-    if n_dimensions != 1 {
-        return Err(PyValueError::new_err(format!(
-            "the column `{name}` has {n_dimensions} dimensions"
-        )));
+    let fields = fields.into_iter().map(|(name, column)| (name, column, true));
+    Ok(RecordBatch::try_from_iter_with_nullable(fields).map_err(ColumnError::from)?)
+}
+
+/// Returns a column of a mapping; `None` if it has neither numbers nor text. The values of a NumPy
+/// array are copied, because other threads may change it while it is judged.
+fn python_column(values: &Bound<'_, PyAny>) -> PyResult<Option<ArrayRef>> {
+    let is_array = values.hasattr("dtype")? && values.hasattr("tobytes")?;
+    let is_flat = !is_array || values.getattr("ndim")?.extract::<usize>()? == 1;
+    if !is_flat || values.is_instance_of::<PyString>() {
+        return Ok(None);
     }
-    let bytes = column.call_method0("tobytes")?;
-    let (values, _) = bytes.extract::<&[u8]>()?.as_chunks();
-    Ok(values.iter().copied().map(f64::from_le_bytes).collect::<Vec<_>>().into())
+    if is_array && let Ok(values) = values.call_method1("astype", ("<f8",)) {
+        let bytes = values.call_method0("tobytes")?;
+        let (values, _) = bytes.extract::<&[u8]>()?.as_chunks();
+        let values = values.iter().copied().map(f64::from_le_bytes);
+        return Ok(Some(Arc::new(Float64Array::from_iter_values(values))));
+    }
+    if let Ok(numbers) = values.extract::<Vec<Option<f64>>>() {
+        return Ok(Some(Arc::new(Float64Array::from(numbers))));
+    }
+    let texts = values.extract::<Vec<Option<String>>>().ok();
+    Ok(texts.map(|texts| Arc::new(StringArray::from(texts)) as ArrayRef))
 }
 
 /// Takes the stream of record batches that `source` offers.

@@ -67,7 +67,7 @@ impl EvidenceRows {
             ("x_residual_m_s2", "y_residual_m_s2", AxisEvidence::residual_m_s2),
             ("x_limit_m_s2", "y_limit_m_s2", |e| Some(e.limit_m_s2)),
             ("x_nats", "y_nats", |e| Some(e.nats)),
-            ("x_path_error_m", "y_path_error_m", |e| e.path_error_m),
+            ("x_path_nats", "y_path_nats", |e| e.path_nats),
         ];
         let rows = || self.0.iter();
         let mut columns = vec![("t_s", numbers(rows().map(|row| Some(row.t_s))))];

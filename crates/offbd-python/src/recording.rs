@@ -1,27 +1,35 @@
 //! Recordings that come from Python: tables, and the session files that the program `offbd` reads.
+//!
+//! A table with the columns of a session is read column by column. Any other one, whose columns
+//! have other names or units, or that lacks an axis or the time, is read as the Arrow stream that
+//! it would be in a file.
 
+use std::fmt;
 use std::fs::File;
 use std::io;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use arrow_array::ffi_stream::RecordBatchStreamReader;
-use arrow_schema::ArrowError;
+use arrow_array::{RecordBatch, RecordBatchReader};
+use arrow_ipc::writer::StreamWriter;
+use arrow_schema::{ArrowError, Schema};
 use pyo3::exceptions::{PyTypeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyMapping, PyString};
 use sha2::{Digest, Sha256};
 
-use crate::columns::{ColumnError, SampleColumns, record_batch, stream};
+use crate::columns::{ColumnError, SampleColumns, batch_of_mapping, record_batch, stream};
 use crate::table::Table;
 use crate::{rig, unusable};
 use offbd_core::vocabulary::Sample;
-use offbd_wire::session_csv;
+use offbd_wire::session_csv::{self, COLUMNS};
 use offbd_wire::session_file::{
-    self, RejectedRow, RowPlace, SessionFileError, SessionRowError, SessionRows,
+    self, RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows,
 };
 use offbd_wire::table::{RATES_HZ, TableOptions};
 
-/// A recording: a file, or a table in batches.
+/// A recording: a file or what is read as one, or a table in batches.
 pub(crate) enum Recording {
     File(Box<SessionFile>),
     Stream(RecordBatchStreamReader),
@@ -30,24 +38,44 @@ pub(crate) enum Recording {
 
 /// A session file, and how it is read.
 pub(crate) struct SessionFile {
-    path: PathBuf,
+    source: Source,
     options: TableOptions,
 }
+
+/// Where the bytes of a session file are.
+#[derive(Clone, Debug)]
+pub(crate) enum Source {
+    Path(PathBuf),
+    /// A table, as an Arrow stream.
+    Table(Arc<[u8]>),
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Path(path) => path.display().fmt(f),
+            Self::Table(_) => f.write_str("the recording"),
+        }
+    }
+}
+
+/// Rows of a record batch in the Arrow stream of a table: a reader takes a batch at a time into memory.
+const BATCH_ROWS: usize = 1 << 16;
 
 /// Why a recording cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum RecordingError {
     #[error(transparent)]
     Columns(#[from] ColumnError),
-    #[error("{}: {error}", path.display())]
-    Unreadable { path: PathBuf, error: io::Error },
-    #[error("{}: {error}", path.display())]
-    NotSession { path: PathBuf, error: SessionFileError },
+    #[error("{file}: {error}")]
+    Unreadable { file: Source, error: io::Error },
+    #[error("{file}: {error}")]
+    NotSession { file: Source, error: SessionFileError },
     #[error(
-        "{}: the clock starts again at {place}, so the file has several runs; \
-         `offbd.read` returns a table for each", path.display()
+        "{file}: the clock starts again at {place}, so there are several runs; \
+         `offbd.read` returns a table for each"
     )]
-    SeveralRuns { path: PathBuf, place: RowPlace },
+    SeveralRuns { file: Source, place: RowPlace },
 }
 
 impl From<ArrowError> for RecordingError {
@@ -80,26 +108,59 @@ pub(crate) fn options(columns: Option<&str>, rate_hz: Option<f64>) -> PyResult<T
 }
 
 impl Recording {
-    /// Takes a recording from Python. `options` say how a file is read.
+    /// Takes a recording from Python. `options` say how a file, and a table with other columns than
+    /// those of a session, is read.
     pub(crate) fn of(source: &Bound<'_, PyAny>, options: &TableOptions) -> PyResult<Self> {
         if source.is_instance_of::<PyString>() || source.hasattr("__fspath__")? {
-            let file = SessionFile { path: source.extract()?, options: options.clone() };
-            return Ok(Self::File(Box::new(file)));
+            return Ok(Self::file(Source::Path(source.extract()?), options));
         }
         if source.hasattr("__arrow_c_stream__")? {
-            return Ok(Self::Stream(stream(source)?));
+            let batches = stream(source)?;
+            if is_session(&batches.schema(), options) {
+                return Ok(Self::Stream(batches));
+            }
+            return Self::table(&batches.schema(), batches, options);
         }
-        if source.hasattr("__arrow_c_array__")? {
-            return Ok(Self::Whole(Box::new(SampleColumns::of_batch(&record_batch(source)?)?)));
+        let batch = if source.hasattr("__arrow_c_array__")? {
+            record_batch(source)?
+        } else if let Ok(columns) = source.cast::<PyMapping>() {
+            batch_of_mapping(columns)?
+        } else {
+            return Err(PyTypeError::new_err(format!(
+                "a recording is the path of a session file, a table with `__arrow_c_stream__` or \
+                 `__arrow_c_array__`, or a mapping from names to columns, not {}",
+                source.get_type().name()?
+            )));
+        };
+        if is_session(batch.schema_ref(), options) {
+            return Ok(Self::Whole(Box::new(SampleColumns::of_batch(&batch)?)));
         }
-        if let Ok(columns) = source.cast::<PyMapping>() {
-            return Ok(Self::Whole(Box::new(SampleColumns::of_mapping(columns)?)));
-        }
-        Err(PyTypeError::new_err(format!(
-            "a recording is the path of a session file, a table with `__arrow_c_stream__` or \
-             `__arrow_c_array__`, or a mapping from names to columns, not {}",
-            source.get_type().name()?
-        )))
+        Self::table(&batch.schema(), [Ok(batch)], options)
+    }
+
+    fn file(source: Source, options: &TableOptions) -> Self {
+        Self::File(Box::new(SessionFile { source, options: options.clone() }))
+    }
+
+    /// Takes a table whose columns are found by `options`.
+    fn table(
+        schema: &Schema,
+        batches: impl IntoIterator<Item = Result<RecordBatch, ArrowError>>,
+        options: &TableOptions,
+    ) -> PyResult<Self> {
+        let written = || -> Result<Vec<u8>, ArrowError> {
+            let mut writer = StreamWriter::try_new(Vec::new(), schema)?;
+            for batch in batches {
+                let batch = batch?;
+                for start in (0..batch.num_rows()).step_by(BATCH_ROWS) {
+                    let n = BATCH_ROWS.min(batch.num_rows() - start);
+                    writer.write(&batch.slice(start, n))?;
+                }
+            }
+            writer.into_inner()
+        };
+        let bytes = written().map_err(ColumnError::from)?;
+        Ok(Self::file(Source::Table(bytes.into()), options))
     }
 
     /// Calls `take` with each row of a single session, in order: a sample or a rejected row, and
@@ -130,7 +191,7 @@ impl Recording {
                         take(place, row);
                         Ok(())
                     }
-                    _ => Err(RecordingError::SeveralRuns { path: file.path.clone(), place }),
+                    _ => Err(RecordingError::SeveralRuns { file: file.source.clone(), place }),
                 });
             }
         }
@@ -142,7 +203,7 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`].
     pub(crate) fn runs(self) -> Result<Runs, RecordingError> {
-        let mut runs = Runs { path: None, samples: vec![Vec::new()], rejected: Vec::new() };
+        let mut runs = Runs { file: None, samples: vec![Vec::new()], rejected: Vec::new() };
         match self {
             Self::File(file) => {
                 file.for_each(|n_run, _, row| {
@@ -150,7 +211,7 @@ impl Recording {
                     runs.push(row);
                     Ok(())
                 })?;
-                runs.path = Some(file.path);
+                runs.file = Some(file.source);
             }
             table => table.for_each(0, |_, row| runs.push(row))?,
         }
@@ -160,7 +221,7 @@ impl Recording {
     /// The name of the session: that of the file, or else `session`.
     pub(crate) fn name(&self) -> String {
         let Self::File(file) = self else { return "session".to_owned() };
-        let path = &file.path;
+        let Source::Path(path) = &file.source else { return "session".to_owned() };
         path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
     }
 }
@@ -185,23 +246,38 @@ impl SessionFile {
     }
 
     fn open(&self) -> Result<Box<dyn SessionRows>, RecordingError> {
-        let file = File::open(&self.path).map_err(|error| self.error(error.into()))?;
-        session_file::open(file, None, &self.options).map_err(|error| self.error(error))
+        let opened = match &self.source {
+            Source::Path(path) => {
+                let file = File::open(path).map_err(|error| self.error(error.into()))?;
+                session_file::open(file, None, &self.options)
+            }
+            Source::Table(bytes) => {
+                let stream = io::Cursor::new(Arc::clone(bytes));
+                session_file::open(stream, Some(SessionFormat::Arrow), &self.options)
+            }
+        };
+        opened.map_err(|error| self.error(error))
     }
 
     fn error(&self, error: SessionFileError) -> RecordingError {
-        let path = self.path.clone();
+        let file = self.source.clone();
         match error {
-            SessionFileError::Io(error) => RecordingError::Unreadable { path, error },
-            error => RecordingError::NotSession { path, error },
+            SessionFileError::Io(error) => RecordingError::Unreadable { file, error },
+            error => RecordingError::NotSession { file, error },
         }
     }
 }
 
+/// Whether a table is a session as it is: it has all columns, and nothing says that they are others.
+fn is_session(schema: &Schema, options: &TableOptions) -> bool {
+    let has_all = COLUMNS.iter().all(|name| schema.column_with_name(name).is_some());
+    has_all && options.columns.is_empty() && options.of_rig.is_empty()
+}
+
 /// The runs of a recording: in a text, a clock that starts again begins another one.
 pub(crate) struct Runs {
-    /// The file; `None` for a table.
-    path: Option<PathBuf>,
+    /// The file, or what was read as one; `None` for another table.
+    file: Option<Source>,
     /// The samples of each run; there is at least one.
     pub(crate) samples: Vec<Vec<Sample>>,
     rejected: Vec<RejectedRow>,
@@ -217,44 +293,48 @@ impl Runs {
 
     /// Adds the bytes of the file to `hash`; of a table those of the CSV file that it would be.
     pub(crate) fn add_to_hash(&self, hash: &mut Sha256) -> Result<(), RecordingError> {
-        let bytes = match &self.path {
-            Some(path) => std::fs::read(path),
-            None => self.csv(),
+        let bytes = match &self.file {
+            Some(file @ Source::Path(path)) => std::fs::read(path)
+                .map_err(|error| RecordingError::Unreadable { file: file.clone(), error })?,
+            Some(Source::Table(_)) | None => self.csv(),
         };
-        let path = self.path.clone().unwrap_or_default();
-        hash.update(bytes.map_err(|error| RecordingError::Unreadable { path, error })?);
+        hash.update(bytes);
         Ok(())
     }
 
-    fn csv(&self) -> io::Result<Vec<u8>> {
+    fn csv(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
-        self.samples.iter().try_for_each(|run| session_csv::write(&mut bytes, run))?;
-        Ok(bytes)
+        for run in &self.samples {
+            // Memory can always be written to.
+            let _ = session_csv::write(&mut bytes, run);
+        }
+        bytes
     }
 
     /// Warns in Python if rows of the file were rejected.
     pub(crate) fn warn(&self, py: Python<'_>) -> PyResult<()> {
-        let (Some(path), Some(first)) = (&self.path, self.rejected.first()) else { return Ok(()) };
-        let (n, path) = (self.rejected.len(), path.display());
-        let text = format!("{path}: {n} rows rejected, the first: {first}");
+        let (Some(file), Some(first)) = (&self.file, self.rejected.first()) else { return Ok(()) };
+        let n = self.rejected.len();
+        let text = format!("{file}: {n} rows rejected, the first: {first}");
         let text = std::ffi::CString::new(text).map_err(unusable)?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
     }
 }
 
-/// Reads a session file; returns the table of each run. `asset_file` may say which columns are
-/// which quantities.
+/// Reads a session file or a table; returns the table of each run. `asset_file` may say which columns
+/// are which quantities.
 #[pyfunction]
 pub(crate) fn read(
     py: Python<'_>,
-    path: PathBuf,
+    recording: &Bound<'_, PyAny>,
     asset_file: Option<&str>,
     columns: Option<&str>,
     rate_hz: Option<f64>,
 ) -> PyResult<Vec<Table>> {
     let rig = rig(asset_file).map_err(unusable)?;
     let options = options(columns, rate_hz)?.of_rig(rig.columns.as_deref());
-    let runs = py.detach(|| Recording::File(Box::new(SessionFile { path, options })).runs())?;
+    let recording = Recording::of(recording, &options)?;
+    let runs = py.detach(|| recording.runs())?;
     runs.warn(py)?;
     let with_seq = |run: &[Sample]| run.iter().any(|sample| sample.seq.is_some());
     let tables = runs.samples.iter().map(|run| Table::of_samples(run, with_seq(run)));

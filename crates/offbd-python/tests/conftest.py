@@ -76,7 +76,7 @@ class Service:
 
 
 class Listener:
-    """Serves each connection to a port of its own."""
+    """Serves each connection to its own port."""
 
     def __init__(self) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))

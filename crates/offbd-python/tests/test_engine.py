@@ -205,18 +205,20 @@ def test_other_threads_run_meanwhile(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: offbd.replay({"t_s": [0.0]}), "column `cmd_qx_rad` is missing"),
-        (lambda: offbd.replay(pa.table({"t_s": ["a"]})), "`t_s` has the type Utf8"),
+        (lambda: offbd.replay({"t_s": [0.0]}), "lacks the column `cmd_qx_rad`; it has `t_s`"),
         (lambda: offbd.replay(EMPTY), "no usable row"),
         (lambda: offbd.replay({**{name: [0.0] for name in COLUMNS}, "y_m": []}), "`y_m`.*1 and 0"),
-        (lambda: offbd.replay({**{name: [0.0] for name in COLUMNS}, "x_m": ["a"]}), "`x_m`"),
+        (
+            lambda: offbd.replay({**{name: [0.0] for name in COLUMNS}, "x_m": ["a"]}),
+            "`x_m` has the type Utf8",
+        ),
         (
             lambda: offbd.replay({**{n: [0.0] for n in COLUMNS}, "seq": [-1]}),
             "`seq` has -1 in row 0",
         ),
         (
             lambda: offbd.replay({**{n: [0.0] for n in COLUMNS}, "x_m": np.zeros((1, 1))}),
-            "`x_m` has 2 dimensions",
+            "`x_m` is neither numbers nor text in one dimension",
         ),
         (lambda: offbd.replay(EMPTY, '{"name":"a","bal":{}}'), "/bal"),
         (lambda: offbd.replay(EMPTY, profile=any_word("best")), "best"),
@@ -233,7 +235,7 @@ def test_what_is_unusable_is_named(call: Any, message: str) -> None:
         call()
 
 
-def test_what_is_no_table_is_named() -> None:
+def test_what_is_not_a_table_is_named() -> None:
     with pytest.raises(TypeError, match="not int"):
         offbd.replay(3)
 

@@ -8,7 +8,9 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
+import polars as pl
 import pyarrow as pa
 import pyarrow.parquet
 import pytest
@@ -82,6 +84,72 @@ def test_a_mapping_of_columns_is_an_argument_or_part_of_the_asset(folder: Path) 
     assert len(table) == len(pd.read_csv(file, sep=";"))
     with pytest.raises(ValueError, match="rate_hz: expected a number"):
         offbd.replay(file, rate_hz=0.0)
+
+
+def tables(file: Path) -> dict[str, Any]:
+    """The rows of a file with semicolons, as tables of other libraries and as columns."""
+    frame = pd.read_csv(file, sep=";")
+    return {
+        "pandas": frame,
+        "polars": pl.from_pandas(frame),
+        "pyarrow": pa.Table.from_pandas(frame),
+        "batch": pa.RecordBatch.from_pandas(frame),
+        "arrays": {name: frame[name].to_numpy() for name in frame.columns},
+        "lists": {**frame.to_dict("list"), "notes": object(), "picture": np.zeros((2, 2))},
+    }
+
+
+def test_a_table_has_a_mapping_as_a_file_has(folder: Path) -> None:
+    file = with_other_columns(folder, "sick.csv")
+    asset = folder / "learnt.json"
+    own = {**json.loads(asset.read_text()), "columns": MAPPING}
+    wanted = judged_by_program(asset, file, "--columns", MAPPING)[-1]
+    for name, table in tables(file).items():
+        verdict = offbd.replay(table, asset, columns=MAPPING)
+        assert verdict.hash == offbd.replay(table, own).hash == wanted["verdict_hash"], name
+        assert verdict.summary["session"] == "session"
+        with pytest.raises(ValueError, match="lacks the column `t_s`; it has `time`"):
+            offbd.replay(table, asset)
+    healthy = with_other_columns(folder, "healthy.csv")
+    learnt = without_date(offbd.calibrate(folder / "rig.json", healthy, columns=MAPPING))
+    frame = tables(healthy)["pandas"]
+    again = without_date(offbd.calibrate(folder / "rig.json", frame, columns=MAPPING))
+    for calibration in (learnt["calibration"], again["calibration"]):
+        del calibration["data_sha256"], calibration["id"]  # of the bytes of the file
+    assert again == learnt
+
+
+def test_a_table_of_dates_degrees_and_one_axis_is_read(folder: Path) -> None:
+    rows = pd.read_csv(folder / "sick.csv")
+    start = pd.Timestamp("2026-02-20T13:51:00+01:00")
+    frame = pd.DataFrame(
+        {
+            "when": start + pd.to_timedelta(rows["t_s"], unit="s"),
+            "servo": np.degrees(rows["cmd_qy_rad"]),
+            "ball": rows["x_m"] * 100.0,
+        }
+    )
+    file = folder / "beam.csv"
+    frame.to_csv(file, index=False)
+    mapping = "t_s=when, cmd_qy_rad=servo/deg, x_m=ball/cm"
+    wanted = judged_by_program(folder / "rig.json", file, "--columns", mapping)[-1]
+    texts = {"when": [str(when) for when in frame["when"]], **frame.drop(columns="when")}
+    for table in (frame, texts):
+        verdict = offbd.replay(table, folder / "rig.json", columns=mapping)
+        assert verdict.hash == wanted["verdict_hash"]
+    rate = frame.drop(columns="when")
+    (table,) = offbd.read(rate, columns="cmd_qy_rad=servo/deg, x_m=ball/cm", rate_hz=100.0)
+    assert table.to_pydict()["t_s"][:3] == [0.0, 0.01, 0.02]
+    assert set(table.to_pydict()["y_m"]) == {None}
+
+
+def test_the_runs_of_a_table_are_sessions(folder: Path) -> None:
+    frame = pd.read_csv(folder / "healthy.csv").rename(columns={"t_s": "time"})
+    both = pd.concat([frame, frame])
+    with pytest.raises(ValueError, match="the recording: the clock starts again at row"):
+        offbd.replay(both, columns="t_s=time")
+    runs = offbd.read(both, columns="t_s=time")
+    assert [run.to_pydict() for run in runs] == [lists(folder / "healthy.csv")] * 2
 
 
 def test_a_text_without_a_time_has_a_rate(folder: Path) -> None:
@@ -169,7 +237,7 @@ def test_numbered_samples_keep_their_numbers(folder: Path) -> None:
     assert read.to_pydict() == table.to_pydict()
 
 
-def test_a_file_that_is_no_recording_is_named(folder: Path) -> None:
+def test_a_file_that_is_not_a_recording_is_named(folder: Path) -> None:
     (folder / "empty.csv").write_text("")
     (folder / "cut.parquet").write_bytes(converted(folder, "parquet").read_bytes()[:-9])
     (folder / "picture.csv").write_bytes(b"\x89PNG\r\n\x1a\n")

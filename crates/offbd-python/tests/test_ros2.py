@@ -1,15 +1,19 @@
-"""The part of the ROS 2 example that needs no ROS, with a real service."""
+"""The ROS 2 example: the part that needs no ROS, with a real service, and the node, with stubs."""
 
 from __future__ import annotations
 
 import csv
+import importlib
 import importlib.util
+import math
 import socket
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar
 
 import pytest
 from conftest import Peer, Service, answered, problem
@@ -167,8 +171,8 @@ def test_a_network_that_swallows_packets_does_not_hold_up_the_executor(peer: Pee
     ("status", "byte", "level", "message"),
     [
         ("confirmed", "2f", "ERROR", "confirmed, dead"),
-        ("confirmed", "2c", "WARN", "passes again; on record as confirmed, dead"),
-        ("pending", "27", "WARN", "pending, dead"),
+        ("confirmed", "2c", "WARN", "passing again; was confirmed, dead"),
+        ("pending", "27", "WARN", "suspected, dead"),
     ],
 )
 def test_only_a_confirmed_fault_that_fails_now_is_an_error(
@@ -179,4 +183,110 @@ def test_only_a_confirmed_fault_that_fails_now_is_an_error(
     found = {d.name: d for d in one.of_faults([fault])}
     assert found["rig: x servo"].level == getattr(bridge, level)
     assert found["rig: x servo"].message == message
+
+
+def test_a_kind_that_is_only_probable_is_not_told_as_a_fact() -> None:
+    one = bridge.Bridge(offbd.Client(), "rig", "s")
+    fault = {"code": "x_servo", "status": "confirmed", "status_byte": "2f", "kind": "dead"}
+    for weight, words in [(0.512, "probably dead, 51 %"), (0.8, "dead")]:
+        candidates = [{"code": "x_servo", "kind": "dead", "weight": weight}]
+        found = {d.name: d for d in one.of_faults([{**fault, "candidates": candidates}])}
+        assert found["rig: x servo"].message == f"confirmed, {words}"
     assert found["rig: ball"].level == bridge.OK
+
+
+class RosNode:
+    """Stands for `rclpy.node.Node`, with a publisher that keeps what it gets."""
+
+    parameters: ClassVar[dict[str, str]] = {}
+
+    def __init__(self, name: str) -> None:
+        self.published: list[Any] = []
+
+    def declare_parameter(self, name: str, default: str) -> Any:
+        return SimpleNamespace(value=self.parameters.get(name, default))
+
+    def get_clock(self) -> Any:
+        return SimpleNamespace(now=lambda: SimpleNamespace(nanoseconds=0, to_msg=lambda: None))
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=lambda *_, **__: None)
+
+    def create_publisher(self, kind: Any, topic: str, depth: int) -> Any:
+        return SimpleNamespace(publish=self.published.append)
+
+    def create_subscription(self, *arguments: Any) -> None:
+        pass
+
+    create_timer = create_subscription
+
+
+@pytest.fixture
+def silent_peer() -> Iterator[Peer]:
+    """Takes each request, and answers none."""
+    made = Peer()
+    made.answers = [None] * 100
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def ros_node(silent_peer: Peer, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """The node of `node.py`, with stubs for the packages of ROS."""
+    ended = threading.Event()
+
+    def array() -> Any:
+        return SimpleNamespace(header=SimpleNamespace(stamp=None), status=[])
+
+    packages: dict[str, dict[str, Any]] = {
+        "rclpy": {"ok": lambda: not ended.is_set()},
+        "rclpy.node": {"Node": RosNode},
+        "rclpy.qos": {"qos_profile_sensor_data": None},
+        "diagnostic_msgs": {},
+        "diagnostic_msgs.msg": {
+            "DiagnosticArray": array,
+            "DiagnosticStatus": SimpleNamespace,
+            "KeyValue": SimpleNamespace,
+        },
+        "geometry_msgs": {},
+        "geometry_msgs.msg": {"PointStamped": None},
+        "sensor_msgs": {},
+        "sensor_msgs.msg": {"JointState": None},
+    }
+    for name, content in packages.items():
+        stub = ModuleType(name)
+        vars(stub).update(content)
+        monkeypatch.setitem(sys.modules, name, stub)
+    monkeypatch.syspath_prepend(EXAMPLE)
+    monkeypatch.setattr(RosNode, "parameters", {"url": silent_peer.url})
+    module = importlib.import_module("offbd_bridge.node")
+    # Its threads do not try again when the peer ends.
+    monkeypatch.setattr(module, "PATIENCE_S", 0.0)
+    yield module.OffbdNode()
+    ended.set()
+    for name in ("offbd_bridge.node", "offbd_bridge.bridge", "offbd_bridge"):
+        sys.modules.pop(name, None)
+
+
+def test_no_callback_of_the_node_waits_for_the_service(silent_peer: Peer, ros_node: Any) -> None:
+    while not silent_peer.silent:
+        time.sleep(0.001)
+    ros_node.on_command(SimpleNamespace(name=["qx", "qy"], position=[0.1, 0.2]))
+    stamp = SimpleNamespace(sec=1, nanosec=500_000_000)
+    point = SimpleNamespace(x=0.01, y=math.nan)
+    ros_node.on_ball(SimpleNamespace(header=SimpleNamespace(stamp=stamp), point=point))
+    ros_node.publish()
+    # The first question about the faults still has no answer, not even that there is none.
+    shown = [(status.level, status.message) for status in ros_node.published[0].status]
+    assert shown == [(bytes([bridge.STALE]), "not asked yet")] * 4
+    while len(silent_peer.silent) < 2:
+        time.sleep(0.001)
+    (sample,) = ros_node.bridge._batch()
+    assert sample == {
+        "seq": 0,
+        "t_s": 1.5,
+        "x_m": 0.01,
+        "y_m": None,
+        "cmd_qx_rad": 0.1,
+        "cmd_qy_rad": 0.2,
+    }

@@ -31,7 +31,9 @@ impl Clock {
 /// The reason why it is invalid.
 pub fn parse_timestamp(text: &str) -> Result<Micros, String> {
     let parsed: Result<jiff::Timestamp, _> = text.parse();
-    parsed.map(jiff::Timestamp::as_microsecond).map_err(|error| error.to_string())
+    parsed
+        .map(jiff::Timestamp::as_microsecond)
+        .map_err(|error| format!("expected a time such as 2026-02-20T13:51:00Z: {error}"))
 }
 
 /// Formats a timestamp as RFC 3339, UTC, with microseconds. All results have the same

@@ -47,7 +47,7 @@ impl Serialize for EntityTag {
     }
 }
 
-/// Which edition a request may replace (`If-Match`).
+/// Which edition a request may replace (`If-Match`, `If-None-Match`).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Expected {
     /// Any, also none.
@@ -55,6 +55,8 @@ pub enum Expected {
     Anything,
     /// Any that exists.
     Existing,
+    /// None: the request creates it.
+    Nothing,
     /// One with one of these tags, without quotes.
     OneOf(Vec<String>),
 }
@@ -66,16 +68,16 @@ impl Expected {
     /// [`ServiceError::Changed`].
     pub(super) fn check(&self, found: Option<&EntityTag>) -> Result<(), ServiceError> {
         let is_met = match (self, found) {
-            (Self::Anything, _) | (Self::Existing, Some(_)) => true,
+            (Self::Anything, _) | (Self::Existing, Some(_)) | (Self::Nothing, None) => true,
             (Self::OneOf(tags), Some(found)) => tags.iter().any(|tag| tag == found.as_str()),
-            (Self::Existing | Self::OneOf(_), None) => false,
+            (Self::Existing | Self::OneOf(_), None) | (Self::Nothing, Some(_)) => false,
         };
         if is_met { Ok(()) } else { Err(ServiceError::Changed { now: found.cloned() }) }
     }
 
     /// Whether the edition matters that is replaced.
     pub(super) const fn is_particular(&self) -> bool {
-        matches!(self, Self::OneOf(_))
+        matches!(self, Self::OneOf(_) | Self::Nothing)
     }
 }
 
@@ -110,6 +112,8 @@ mod tests {
             (Expected::Anything, Some(&new), true),
             (Expected::Existing, None, false),
             (Expected::Existing, Some(&new), true),
+            (Expected::Nothing, None, true),
+            (Expected::Nothing, Some(&new), false),
             (of(&[&old]), Some(&new), false),
             (of(&[&old, &new]), Some(&new), true),
             (of(&[&new]), None, false),

@@ -42,7 +42,7 @@ pub enum ServiceError {
     UnknownCode(UnknownWord),
     #[error("asset `{name}` already exists; replace it with PUT /api/v1/assets/{name}")]
     AssetExists { name: String },
-    #[error("a token named `{name}` is in force; revoke it first, or use another name")]
+    #[error("a valid token named `{name}` exists; revoke it first, or use another name")]
     TokenExists { name: String },
     #[error("asset `{asset}` already has a session `{name}`")]
     SessionExists { asset: String, name: String },
@@ -66,7 +66,7 @@ pub enum ServiceError {
     )]
     NothingOffered { asset: String },
     #[error(
-        "asset `{asset}` is calibrated; remove the calibration from its asset file to learn it \
+        "asset `{asset}` is calibrated; remove the calibration from its asset file to calibrate it \
          again"
     )]
     AlreadyLearnt { asset: String },

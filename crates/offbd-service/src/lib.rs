@@ -104,8 +104,8 @@ pub use notifications::{
 pub use reanalysis::fault_recording::RecordingWindow;
 pub use reanalysis::trace::{MAX_TRACE_POINTS, TraceQuery};
 pub use requests::{
-    AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, MAX_SERIES_SESSIONS, PendingBatch,
-    PresentFault, QueueLoad, SeriesQuery, SessionListQuery, TraceReader,
+    AlarmQuery, DeliveryQuery, FaultQuery, FleetQuery, ImportFile, MAX_SERIES_SESSIONS,
+    PendingBatch, PresentFault, QueueLoad, SeriesQuery, SessionListQuery, TraceReader,
 };
 pub use start::{Service, Workers};
 pub use writing::{Event, EventFeed, EventKind};

@@ -212,7 +212,7 @@ pub(super) const MAX_TRACES: usize = 2;
 /// Whole traces that are computed and read at a time; further requests are refused meanwhile.
 pub(super) const MAX_WHOLE_TRACES: usize = 2;
 
-/// Files that are read for imports at a time, each on a thread of its own; further ones wait, as
+/// Files that are read for imports at a time, each on its own thread; further ones wait, as
 /// whoever sent one would have to send it again. Chosen: with more, what a file expands to could
 /// take more memory than all request bodies.
 pub(super) const MAX_IMPORTS: usize = 2;

@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::clock::rfc3339;
+use super::{EntityTag, ServiceError};
 use offbd_store::{Micros, MuteRow};
 use offbd_wire::alarm::MuteView;
 use offbd_wire::words::AlarmCodeWord;
@@ -18,9 +19,16 @@ use offbd_wire::words::AlarmCodeWord;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mutes {
     by_asset: Arc<Mutex<BTreeMap<String, BTreeMap<AlarmCodeWord, MuteRow>>>>,
+    /// Held while a mute is changed in the store and here, so that both agree.
+    changing: Arc<tokio::sync::Mutex<()>>,
 }
 
 impl Mutes {
+    /// Waits until nobody else changes a mute.
+    pub(super) async fn begin_change(&self) -> tokio::sync::MutexGuard<'_, ()> {
+        self.changing.lock().await
+    }
+
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, BTreeMap<AlarmCodeWord, MuteRow>>> {
         self.by_asset.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -56,6 +64,18 @@ impl Mutes {
         (row.until > now).then(|| view(code, row))
     }
 
+    /// Returns the entity tag of the mute of `code` of `asset` that is in force at `now`.
+    pub(super) fn tag_of(
+        &self,
+        asset: &str,
+        code: AlarmCodeWord,
+        now: Micros,
+    ) -> Result<Option<EntityTag>, ServiceError> {
+        let all = self.lock();
+        let row = all.get(asset).and_then(|codes| codes.get(&code));
+        row.filter(|row| row.until > now).map(tag).transpose()
+    }
+
     /// Returns the mutes of `asset` that are in force at `now`, in the order of their codes.
     pub(super) fn of_asset(&self, asset: &str, now: Micros) -> Vec<MuteView> {
         let mut all = self.lock();
@@ -67,6 +87,7 @@ impl Mutes {
 
 fn view(code: AlarmCodeWord, row: &MuteRow) -> MuteView {
     MuteView {
+        etag: tag(row).map_or_else(|_| String::new(), |tag| tag.to_string()),
         asset: row.asset.clone(),
         code,
         by: row.actor.clone(),
@@ -74,6 +95,10 @@ fn view(code: AlarmCodeWord, row: &MuteRow) -> MuteView {
         at: rfc3339(row.at),
         until: rfc3339(row.until),
     }
+}
+
+fn tag(row: &MuteRow) -> Result<EntityTag, ServiceError> {
+    EntityTag::of(&(&row.actor, &row.reason, row.at, row.until))
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ pub(super) fn play(
     play_inputs(handles, rows, handles.store.recording(session, first), first, take)
 }
 
-/// As [`play`] from the first sample on, but calls `take` on a thread of its own with this
+/// As [`play`] from the first sample on, but calls `take` on its own thread with this
 /// `priority`. The recording is read on the current thread.
 pub(super) fn play_in_background(
     handles: &Handles,

@@ -54,6 +54,7 @@ pub(super) fn fault(row: FaultRow) -> Result<FaultEntryView, ServiceError> {
         changed_at: rfc3339(row.changed_at),
         monitor: None,
         session_open: None,
+        communication_lost_since: None,
     })
 }
 
@@ -105,6 +106,7 @@ pub(super) async fn never_failed(
         provenance: ProvenanceView::default(),
         monitor: None,
         session_open: None,
+        communication_lost_since: None,
     })
 }
 

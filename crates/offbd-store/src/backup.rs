@@ -8,14 +8,15 @@ use sqlx::{AnyConnection, AssertSqlSafe, Connection, Executor};
 use super::check::{check_copy, check_pages};
 use super::file::{create_private, file_url, sync_directory_of};
 use super::page_checksums::{self, open};
-use super::{Location, MIGRATIONS, StoreError};
+use super::{Location, StoreError, migrations};
 
 /// Copies the database file at `location` to the new file `copy`, also while a service uses
 /// it. The copy is a consistent state of the database with all commits before the call; its
 /// pages have checksums, its contents are checked, and it is on the disk on return.
 ///
 /// # Errors
-/// [`StoreError`] if the database does not exist, `copy` exists, or it cannot be written.
+/// [`StoreError`] if the database does not exist or is newer than this version, which cannot check
+/// it, `copy` exists, or it cannot be written.
 pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError> {
     let file = location.file().ok_or(StoreError::NotSqlite)?;
     check_absent(copy)?;
@@ -23,7 +24,9 @@ pub async fn back_up(location: &Location, copy: &Path) -> Result<(), StoreError>
     remove_if_exists(&part)?;
     location.check_log().await?;
     // Fails if there is no such database.
-    open(file).await?.close().await?;
+    let mut source = open(file).await?;
+    migrations::refuse_newer(&mut source).await?;
+    source.close().await?;
     page_checksums::create(&part).await?;
     let mut written = open(&part).await?;
     copy_rows(&mut written, file).await?;
@@ -56,8 +59,8 @@ pub async fn restore(location: &Location, copy: &Path, replace: bool) -> Result<
     let mut connection = open(&part).await?;
     check_pages(&mut connection).await?;
     // Fails if the file is not a database of offbd.
-    sqlx::query("SELECT version FROM _sqlx_migrations").execute(&mut connection).await?;
-    MIGRATIONS.run_direct(None, &mut connection, false).await?;
+    migrations::schema(&mut connection).await?;
+    migrations::migrate(&mut connection).await?;
     check_copy(&mut connection, location).await?;
     connection.close().await?;
     if file.exists() {

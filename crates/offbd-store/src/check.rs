@@ -13,7 +13,7 @@ use super::from_row::from_row;
 use super::journal::JournalRun;
 use super::read::VISIBLE;
 use super::{
-    Location, MIGRATIONS, Snapshot, Store, StoreError, decode_chunk, journal, page_checksums,
+    Location, Snapshot, Store, StoreError, decode_chunk, journal, migrations, page_checksums,
 };
 
 /// Most findings that are listed; the search ends there.
@@ -116,9 +116,7 @@ async fn check_contents(
 }
 
 async fn check_version(db: &mut AnyConnection) -> Result<(), StoreError> {
-    let found: i64 =
-        sqlx::query_scalar("SELECT MAX(version) FROM _sqlx_migrations").fetch_one(db).await?;
-    let expected = MIGRATIONS.iter().map(|migration| migration.version).max().unwrap_or_default();
+    let (found, expected) = (migrations::schema(db).await?, migrations::latest());
     if found == expected { Ok(()) } else { Err(StoreError::Schema { found, expected }) }
 }
 

@@ -151,7 +151,7 @@ pub(super) async fn copy(connection: &mut AnyConnection) -> Result<LogPages, sql
 }
 
 /// Copies the whole log. There is no limit of time: SQLite notes what it has copied only at
-/// the end, so that on a slow disk an interrupted copy would begin anew each time.
+/// the end, so that on a slow disk an interrupted copy would begin again each time.
 pub(super) async fn copy_all(connection: &mut AnyConnection) -> Result<(), sqlx::Error> {
     let mut copied = std::pin::pin!(copy_until_whole(connection));
     loop {

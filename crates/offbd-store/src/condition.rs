@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use sqlx::AnyConnection;
 
+use super::alarm::{AlarmWrite, NoteRow};
 use super::notification::NotificationWrite;
 use super::{StoreError, tag};
 
@@ -25,12 +26,18 @@ pub enum Expectation {
         asset: String,
         tags: Vec<String>,
     },
+    /// The owner's note on a fault code; `None` if there is none.
+    Note {
+        code: String,
+        found: Option<NoteRow>,
+    },
 }
 
 /// A change that may have a condition.
 #[derive(Clone, Debug)]
 pub enum EditWrite {
     Notification(NotificationWrite),
+    Alarm(AlarmWrite),
     /// Replaces the tags of an asset.
     Tags {
         asset: String,
@@ -63,6 +70,7 @@ impl ConditionalWrite {
         match &self.edit {
             _ if !is_unchanged => Ok(()),
             EditWrite::Notification(write) => write.apply(db).await,
+            EditWrite::Alarm(write) => write.apply(db).await,
             EditWrite::Tags { asset, tags } => tag::put(db, asset, tags).await,
         }
     }
@@ -97,6 +105,20 @@ impl Expectation {
             .bind(id)
             .bind(document)
             .bind(name),
+            Self::Note { found: Some(row), .. } => sqlx::query(
+                "UPDATE note SET text = text
+                 WHERE code = $1 AND text = $2 AND actor = $3 AND at = $4",
+            )
+            .bind(&row.code)
+            .bind(&row.text)
+            .bind(&row.actor)
+            .bind(row.at),
+            // The change replaces this row, or removes it. No other node can insert one meanwhile.
+            Self::Note { code, found: None } => sqlx::query(
+                "INSERT INTO note (code, text, actor, at) VALUES ($1, '', '', 0)
+                 ON CONFLICT (code) DO NOTHING",
+            )
+            .bind(code),
             Self::Tags { asset, tags } => return Ok(tag::of(db, asset).await? == *tags),
         };
         Ok(update.execute(db).await?.rows_affected() > 0)

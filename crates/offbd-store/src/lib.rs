@@ -144,8 +144,8 @@ pub enum StoreError {
     )]
     UnexpectedCommits { expected: i64, found: i64 },
     #[error(
-        "another node of the cluster has the name `{name}`: each node needs a `cluster.name` of \
-         its own"
+        "another node of the cluster has the name `{name}`: each node needs its own \
+         `cluster.name`"
     )]
     NameInUse { name: String },
     /// The database does not list this node any more; it registers when it connects again.
@@ -167,7 +167,7 @@ pub enum StoreError {
     File { file: PathBuf, source: std::io::Error },
     #[error("cannot write the names of the files in {} to the disk: {source}", directory.display())]
     Directory { directory: PathBuf, source: std::io::Error },
-    #[error("{} was removed or replaced while the service was running; restart it", file.display())]
+    #[error("{} was removed or replaced while the service was running; restart the service", file.display())]
     FileGone { file: PathBuf },
     #[error("the copy is damaged: {found}")]
     Damaged { found: String },
@@ -244,6 +244,12 @@ impl StoreError {
     #[must_use]
     pub const fn is_replaced(&self) -> bool {
         matches!(self, Self::UnexpectedCommits { .. } | Self::NameInUse { .. })
+    }
+
+    /// Returns whether the database has the schema of a newer version of offbd.
+    #[must_use]
+    pub const fn is_newer(&self) -> bool {
+        matches!(self, Self::Schema { found, expected } if *found > *expected)
     }
 
     /// The error of a query that takes too long.

@@ -138,7 +138,7 @@ fn is_commit(frame: &[u8]) -> bool {
 struct Format {
     big_endian: bool,
     page_bytes: usize,
-    /// Two random numbers that change when the log begins anew.
+    /// Two random numbers that change when the log begins again.
     salts: [u8; 8],
 }
 
@@ -219,7 +219,7 @@ mod tests {
         }
     }
 
-    /// Commits `n_assets`. If `n_old` is positive, the log begins anew after that many.
+    /// Commits `n_assets`. If `n_old` is positive, the log begins again after that many.
     async fn killed(n_old: i64, n_assets: i64) -> Killed {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("running");

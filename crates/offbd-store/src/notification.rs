@@ -297,6 +297,23 @@ impl Store {
         Ok(query.rows().fetch_all(&self.pool).await?)
     }
 
+    /// The last transition of a code in a session before the event `before`.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the store cannot be read.
+    pub async fn transition_before(
+        &self,
+        asset: &str,
+        session: &str,
+        code: &str,
+        before: i64,
+    ) -> Result<Option<PlannedEventRow>, StoreError> {
+        let sql = "SELECT id, asset, session, at, document FROM transition
+             WHERE asset = $1 AND session = $2 AND code = $3 AND id < $4 ORDER BY id DESC LIMIT 1";
+        let query = sqlx::query_as(sql).bind(asset).bind(session).bind(code).bind(before);
+        Ok(query.fetch_optional(&self.pool).await?)
+    }
+
     /// The deliveries of a channel whose turn has come at `now`: of each asset the first that
     /// is pending, if it is due.
     pub async fn due_deliveries(
@@ -318,6 +335,14 @@ impl Store {
         .bind(i64::from(limit))
         .fetch_all(&self.pool)
         .await?)
+    }
+
+    /// The reminders with the number `n`.
+    pub async fn reminders_at(&self, n: i64) -> Result<Vec<ReminderRow>, StoreError> {
+        Ok(sqlx::query_as("SELECT * FROM reminder WHERE n = $1")
+            .bind(n)
+            .fetch_all(&self.pool)
+            .await?)
     }
 
     /// The reminders that are due at `now`.

@@ -31,7 +31,7 @@ pub struct SessionProgress {
     pub first_t_s: Option<f64>,
     /// The latest `t_s` of the judged samples.
     pub last_t_s: Option<f64>,
-    /// The highest `seq`.
+    /// The highest `seq` of the session; `None` if no sample has one.
     pub last_seq: Option<i64>,
 }
 

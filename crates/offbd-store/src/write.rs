@@ -36,7 +36,7 @@ use super::checkpoint::{self, Checkpointer};
 use super::journal::{Journal, JournalChanges};
 use super::tail::Tails;
 use super::writer_lock::{Backend, WriterRole};
-use super::{Location, MIGRATIONS, NodeIdentity, PartitionId, Partitions, StoreError};
+use super::{Location, NodeIdentity, PartitionId, Partitions, StoreError, migrations};
 
 /// Longest duration of a commit; then its connection is dropped. A disk that is slower
 /// cannot support the service.
@@ -111,7 +111,7 @@ impl Writer {
         mut connection: AnyConnection,
         backend: Option<Backend>,
     ) -> Result<Self, StoreError> {
-        MIGRATIONS.run_direct(None, &mut connection, false).await?;
+        migrations::migrate(&mut connection).await?;
         let partitions = ownership::count(&mut connection).await?;
         Ok(Self {
             location: location.clone(),
@@ -253,7 +253,7 @@ impl Writer {
     async fn connect_again(&mut self) -> Result<bool, StoreError> {
         self.check_file()?;
         let lost = self.backend.as_ref();
-        // Has time limits of its own.
+        // Has its own time limits.
         let (connection, backend) = self.location.writer(self.role, lost).await?;
         self.backend = backend.or(self.backend.take());
         let late = |_| Err(sqlx::Error::Io(std::io::ErrorKind::TimedOut.into()).into());

@@ -1,7 +1,8 @@
-//! What the commands of offbd share: output, tables, logs, errors and
+//! What the commands of offbd share: output, tables, help, logs, errors and
 //! their exit codes.
 
 pub mod errors;
+pub mod help;
 pub mod logging;
 pub mod output;
 pub mod table;

@@ -20,6 +20,10 @@ pub struct MuteView {
     pub at: String,
     /// Time at which the mute ends by itself, RFC 3339.
     pub until: String,
+    /// Entity tag of the mute, for `If-Match`.
+    #[serde(default)]
+    #[schema(required)]
+    pub etag: String,
 }
 
 /// A mute to set.
@@ -53,6 +57,11 @@ pub struct AlarmView {
     /// Whether the rig has an open session. Without one, the results of its tests are those of
     /// a session that has ended.
     pub session_open: bool,
+    /// Time at which the last data of the rig arrived, RFC 3339, if data have stopped during an open
+    /// session; null otherwise. What failed then is not known to fail now.
+    #[serde(default)]
+    #[schema(required)]
+    pub communication_lost_since: Option<String>,
     /// Time at which the last occurrence was found, RFC 3339; of lost communication the
     /// arrival of the last data before it. Null if unknown.
     pub since: Option<String>,
@@ -88,7 +97,7 @@ pub struct CommunicationView {
     pub session: Option<String>,
     /// Always `communication_lost`.
     pub code: AlarmCodeWord,
-    /// `confirmed` when the data stay away, `passed` when they are back.
+    /// `confirmed` when data stop during a session, `passed` when they are back.
     pub status: AlarmChangeWord,
     /// Time at which the last data before the loss arrived, RFC 3339.
     pub since: String,
@@ -166,6 +175,8 @@ pub struct NoteView {
     pub by: String,
     /// When, RFC 3339.
     pub at: String,
+    /// Entity tag of the note, for `If-Match`.
+    pub etag: String,
 }
 
 /// A note to keep.

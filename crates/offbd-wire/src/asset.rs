@@ -46,7 +46,7 @@ pub struct AssetView {
     /// Settings of the diagnosis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub diagnostics: Option<DiagnosticsView>,
-    /// Learnt parameters, written by a calibration; absent on a rig that is not learnt.
+    /// Learnt parameters, written by a calibration; absent on a rig that is not calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationView>,
     /// Which columns of the rig's files are which quantities, such as
@@ -344,10 +344,10 @@ pub struct SessionEstimateView {
 pub struct ProspectsView {
     /// Number of times at which each fault was injected.
     pub trials: usize,
-    /// The x servo; absent if the axis was not learnt.
+    /// The x servo; absent if the axis was not calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<ServoProspectsView>,
-    /// The y servo; absent if the axis was not learnt.
+    /// The y servo; absent if the axis was not calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<ServoProspectsView>,
     /// Median delay for a ball that sticks, s.
@@ -427,12 +427,16 @@ pub struct AxisCalibrationView {
     #[schema(minimum = 0, maximum = 1000)]
     #[serde(default)]
     pub most_nats: f64,
-    /// Largest root mean square deviation of the path from the twin's over two seconds that
-    /// is expected of a healthy servo, in [0, 1] m: the largest of the tests, plus a margin
-    /// if they were few. If 0, it is unknown and paths are not judged.
-    #[schema(minimum = 0, maximum = 1)]
-    #[serde(default)]
-    pub most_path_error_m: f64,
+    /// Largest evidence of the path against the servo while it was healthy, in [0, 1000]
+    /// nats. If absent, it is unknown, and the path alone does not accuse the servo: calibrate
+    /// the rig again.
+    #[schema(minimum = 0, maximum = 1000)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most_path_nats: Option<f64>,
+    /// Of calibrations by earlier versions; not used.
+    #[schema(deprecated)]
+    #[serde(default, skip_serializing)]
+    pub most_path_error_m: Option<f64>,
 }
 
 const fn default_level_spread() -> f64 {
@@ -710,7 +714,10 @@ fn axis_calibration(axis: Axis, view: &AxisCalibrationView) -> Result<AxisCalibr
             Some(error) => positive(&at("model_error_m_s2"), error, 100.0)?,
             None => AxisCalibration::assumed_model_error_m_s2(view.residual_m_s2),
         },
-        most_path_error_m: in_range(&at("most_path_error_m"), view.most_path_error_m, 0.0..=1.0)?,
+        most_path_nats: view
+            .most_path_nats
+            .map(|nats| in_range(&at("most_path_nats"), nats, 0.0..=1e3))
+            .transpose()?,
         most_nats: in_range(&at("most_nats"), view.most_nats, 0.0..=1e3)?,
     })
 }
@@ -787,7 +794,8 @@ pub fn calibration_view(calibration: &Calibration) -> CalibrationView {
         rest_s: c.rest_s,
         model_error_m_s2: Some(c.model_error_m_s2),
         most_nats: c.most_nats,
-        most_path_error_m: c.most_path_error_m,
+        most_path_nats: c.most_path_nats,
+        most_path_error_m: None,
     };
     CalibrationView {
         id: calibration_id(calibration),
@@ -837,8 +845,8 @@ pub fn calibration_id(calibration: &Calibration) -> String {
             hash.update(number.to_bits().to_le_bytes());
         }
         // Added later: calibrations without it keep their ids.
-        if learnt.most_path_error_m > 0.0 {
-            hash.update(learnt.most_path_error_m.to_bits().to_le_bytes());
+        if let Some(nats) = learnt.most_path_nats {
+            hash.update(nats.to_bits().to_le_bytes());
         }
     }
     let SensorCalibration { refresh_s, most_outliers, most_scatter_m, longest_unseen_s } =
@@ -865,6 +873,15 @@ mod tests {
         assert_eq!(rig, Rig::chapter("a"));
         let error = parse(br#"{"$schema":5,"name":"a"}"#).unwrap_err();
         assert_eq!(error.element, "/$schema");
+    }
+
+    #[test]
+    fn lengths_in_millimetres_are_named() {
+        let plate = r#"{"name":"a","plate":{"length_m":380,"width_m":237}}"#;
+        let error = parse(plate.as_bytes()).unwrap_err().to_string();
+        let words =
+            "/plate/length_m: 380 is not above 0 and at most 10: the unit is m, so 380 mm are 0.38";
+        assert_eq!(error, words);
     }
 
     #[test]
@@ -904,7 +921,7 @@ mod tests {
             rest_s: 12.0,
             model_error_m_s2: 0.03,
             most_nats: 4.5,
-            most_path_error_m: 3e-3,
+            most_path_nats: Some(3.0),
         };
         let estimate =
             SessionEstimate { level_rad: -0.02, level_error_rad: 1e-3, gain: Some((0.8, 0.02)) };
@@ -960,7 +977,7 @@ mod tests {
             (r#"{"name":"a","ball":{"radius_m":-1}}"#, "/ball/radius_m", "not above 0"),
             (r#"{"name":"a","ball":{"radius_m":"x"}}"#, "/ball/radius_m", "not a number"),
             (r#"{"name":"a","bal":{}}"#, "/bal", "not known"),
-            (r#"{"name":"a b"}"#, "/name", "letters"),
+            (r#"{"name":"a b"}"#, "/name", "A-Z"),
             (r#"{"ball":{}}"#, "/name", "is missing"),
             (r#"{"name":"a","plate":{"diameter_m":1,"width_m":1}}"#, "/plate/diameter_m", "round"),
             (r#"{"name":"a","axes":{"x_sign":2}}"#, "/axes/x_sign", "neither"),

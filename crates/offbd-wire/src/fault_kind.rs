@@ -14,7 +14,7 @@ pub(crate) struct KindText {
 /// Describes the evidence in a clause; `None` without a number that the clause needs.
 #[derive(Clone, Copy)]
 pub(crate) enum Finding {
-    /// Of a servo, from its response to its command.
+    /// Of a servo, from its response to its command; the clause goes on after "the servo".
     Servo(fn(Axis, &ServoAnswer) -> Option<String>),
     /// Of the sensor.
     Readings(fn(&Evidence) -> Option<String>),
@@ -25,7 +25,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
     KindText {
         kind: FaultKind::Dead,
         finding: Finding::Servo(|axis, answer| {
-            Some(format!("the servo does not answer {}{}", axis.command(), known(answer)))
+            Some(format!("does not respond{}", known(axis, answer)))
         }),
         checks: &[
             "Does the servo have power? Measure the supply at its plug.",
@@ -36,8 +36,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
     KindText {
         kind: FaultKind::Held,
         finding: Finding::Servo(|axis, answer| {
-            let (command, known) = (axis.command(), known(answer));
-            Some(format!("the servo stays where it is whatever {command} asks for{known}"))
+            Some(format!("holds its angle whatever the command{}", known(axis, answer)))
         }),
         checks: &[
             "Does something block the linkage? Move the plate by hand with the power off.",
@@ -57,8 +56,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
     KindText {
         kind: FaultKind::Reversed,
         finding: Finding::Servo(|axis, answer| {
-            let (command, known) = (axis.command(), known(answer));
-            Some(format!("the servo answers {command} the wrong way round{known}"))
+            Some(format!("moves in the wrong direction{}", known(axis, answer)))
         }),
         checks: &[
             "Was the servo replaced or its horn reversed?",
@@ -70,7 +68,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
         finding: Finding::Servo(|_, answer| {
             let (off, error) = (answer.offset_m_s2, answer.offset_error_m_s2);
             Some(format!(
-                "the servo has a constant error, which accelerates the ball by {off:+.2} ± \
+                "has a constant error, which accelerates the ball by {off:+.2} ± \
                  {error:.2} m/s²"
             ))
         }),
@@ -82,11 +80,11 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
     },
     KindText {
         kind: FaultKind::Slow,
-        finding: Finding::Servo(|axis, answer| {
-            let (command, late, error) = (axis.command(), answer.delay_s, answer.delay_error_s);
+        finding: Finding::Servo(|_, answer| {
+            let (late, error) = (answer.delay_s, answer.delay_error_s);
             Some(match late > error {
-                true => format!("the servo answers {command} {late:.2} ± {error:.2} s late"),
-                false => format!("the servo answers {command} late"),
+                true => format!("responds {late:.2} ± {error:.2} s late"),
+                false => "responds late".to_owned(),
             })
         }),
         checks: &[
@@ -97,9 +95,7 @@ static KINDS: [KindText; FaultKind::ALL.len()] = [
     },
     KindText {
         kind: FaultKind::Intermittent,
-        finding: Finding::Servo(|axis, _| {
-            Some(format!("the servo answers {} intermittently", axis.command()))
-        }),
+        finding: Finding::Servo(|_, _| Some("fails intermittently".to_owned())),
         checks: &[
             "Move the cable and the plug while the servo works: a loose contact shows.",
             "Look for a worn gear: does the servo skip at one angle?",
@@ -179,21 +175,22 @@ pub(crate) fn kind_text(kind: FaultKind) -> &'static KindText {
 /// Largest standard error with which a gain is mentioned.
 const MAX_REPORTED_GAIN_ERROR: f64 = 0.3;
 
-/// Describes the part of its command that a servo answers; `None` if it is too uncertain.
+/// Describes the share of its command with which a servo responds, after "the servo"; `None` if it
+/// is too uncertain.
 pub(crate) fn answered_share(axis: Axis, answer: &ServoAnswer) -> Option<String> {
-    let (command, share) = (axis.command(), share(answer)?);
-    Some(format!("the servo answers {share} of {command}{}", unexplained(answer)))
+    Some(format!("responds with {}{}", share(axis, answer)?, unexplained(answer)))
 }
 
-/// Describes the gain in percent; `None` if it is too uncertain.
-fn share(answer: &ServoAnswer) -> Option<String> {
-    let (gain, error) = (100.0 * answer.gain, 100.0 * answer.gain_error);
-    (answer.gain_error <= MAX_REPORTED_GAIN_ERROR).then(|| format!("{gain:.0} ± {error:.0} %"))
+/// Describes the gain as a share of the command; `None` if it is too uncertain.
+fn share(axis: Axis, answer: &ServoAnswer) -> Option<String> {
+    let (gain, error, command) = (100.0 * answer.gain, 100.0 * answer.gain_error, axis.command());
+    (answer.gain_error <= MAX_REPORTED_GAIN_ERROR)
+        .then(|| format!("{gain:.0} ± {error:.0} % of {command}"))
 }
 
 /// The gain in brackets; empty if it is too uncertain.
-fn known(answer: &ServoAnswer) -> String {
-    share(answer).map(|share| format!(" ({share})")).unwrap_or_default()
+fn known(axis: Axis, answer: &ServoAnswer) -> String {
+    share(axis, answer).map(|share| format!(" ({share})")).unwrap_or_default()
 }
 
 /// Describes the acceleration that no command explains; empty if it is not significant.

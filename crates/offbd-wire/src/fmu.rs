@@ -67,7 +67,7 @@ impl FmuPlatform {
         Some(Self { machine, system, suffix })
     }
 
-    /// Returns the place of the library in an FMU. FMI 2.0 has names of its own for x86_64 alone.
+    /// Returns the place of the library in an FMU. FMI 2.0 has its own names for x86_64 alone.
     fn place(self, version: FmiVersion) -> String {
         let folder = match (version, self.machine, self.system) {
             (FmiVersion::V2, "x86_64", "windows") => "win64".to_owned(),

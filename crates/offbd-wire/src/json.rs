@@ -195,7 +195,7 @@ fn found_words(found: Unexpected<'_>) -> String {
 }
 
 /// Returns the JSON words for what a visitor says that it expects. A visitor of the program
-/// has words of its own.
+/// has its own words.
 fn wanted_words(wanted: &str) -> String {
     let words = match wanted {
         "f64" | "f32" => "a number",

@@ -72,7 +72,7 @@ impl Judging {
         self.observe(Input::Sample(sample), |_| {}).unwrap_or(Admission::Duplicate)
     }
 
-    /// Takes one sample that is no retransmission.
+    /// Takes one sample that is not a retransmission.
     pub fn new_sample(&mut self, sample: Sample) -> Admission {
         self.observe(Input::NewSample(sample), |_| {}).unwrap_or(Admission::Duplicate)
     }

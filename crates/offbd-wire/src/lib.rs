@@ -6,6 +6,16 @@
 //! implement `Serialize`, domain types do not; conversions are written by hand. Nothing
 //! here uses sockets or SQL.
 
+#![cfg_attr(
+    not(all(feature = "mcap", feature = "parquet", feature = "xlsx")),
+    allow(
+        dead_code,
+        unused_imports,
+        unused_variables,
+        reason = "what only the formats left out use"
+    )
+)]
+
 pub mod access;
 pub mod advice;
 pub mod alarm;

@@ -3,10 +3,11 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::telemetry::UnknownKeyView;
 use super::words::UnjudgedWord;
 
 /// How the samples of a rig arrive: their rate and spacing on the device's clock, gaps, delay,
-/// and rows that are not judged. It is counted in memory, and anew after a restart of the
+/// and rows that are not judged. It is counted in memory, from zero after a restart of the
 /// service, or when another node of a cluster takes the asset over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = Link)]
@@ -16,7 +17,7 @@ pub struct LinkView {
     pub session_id: Option<String>,
     /// The rate that the asset file states, Hz.
     pub expected_rate_hz: f64,
-    /// A longer spacing is a gap, after which evidence begins anew, s; null without a session.
+    /// Longer pauses restart the evaluation, s; null without a session.
     pub gap_s: Option<f64>,
     /// The time of the service minus that of the device, s, at the batch of the session with the
     /// least delay, so that the shortest way of a batch is in it. A clock that counts from the
@@ -26,6 +27,11 @@ pub struct LinkView {
     pub session: Option<LinkStretchView>,
     /// The last minutes, also of earlier sessions; null if nothing has arrived in them.
     pub recent: Option<LinkStretchView>,
+    /// Keys of the telemetry that are not understood, those of the last batch in the last minutes
+    /// that has any; at most 8.
+    #[serde(default)]
+    #[schema(required)]
+    pub unknown: Vec<UnknownKeyView>,
 }
 
 /// How the samples of a stretch of time have arrived.
@@ -54,9 +60,9 @@ pub struct LinkStretchView {
     pub gaps_s: f64,
     /// Batches with a sample.
     pub batches: u64,
-    /// Mean delay of these behind the fastest batch of their session so far, s.
+    /// Mean delay of the batches behind the fastest batch of their session so far, s.
     pub delay_s: Option<f64>,
-    /// The longest such delay, s.
+    /// Longest delay of a batch behind the fastest batch of its session so far, s.
     pub longest_delay_s: Option<f64>,
     /// Rows that are not judged, by reason; only reasons that occurred.
     pub unjudged: Vec<UnjudgedRowsView>,

@@ -1,4 +1,4 @@
-//! Topics of devices that have formats of their own: which topic is which asset, and where in
+//! Topics of devices that have their own formats: which topic is which asset, and where in
 //! a JSON payload the quantities of a sample are, in which unit and with which sign. Axes are
 //! exchanged by exchanging their pointers.
 

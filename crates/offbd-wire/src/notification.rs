@@ -4,11 +4,14 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use utoipa::ToSchema;
 
 use super::alarm::CommunicationEventView;
 use super::service::{ClearedEventView, FaultEventView};
-use super::words::{AlarmChangeWord, AlarmCodeWord, ChannelKind, DeliveryState, MailSecurity};
+use super::words::{
+    AlarmChangeWord, AlarmCodeWord, ChannelKind, DeliveryState, MailSecurity, WebhookFormat,
+};
 
 /// Settings of a channel: exactly one of `webhook` and `email`.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
@@ -23,7 +26,7 @@ pub struct NewChannelView {
     pub email: Option<NewEmailView>,
 }
 
-/// A webhook: messages are posted to a URL as CloudEvents, signed as Standard Webhooks say.
+/// A webhook: messages are posted to a URL, signed per Standard Webhooks.
 #[derive(Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewWebhookView {
@@ -34,6 +37,8 @@ pub struct NewWebhookView {
     /// channel before or, for a new channel, a new one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub secret: Option<String>,
+    #[serde(default)]
+    pub format: WebhookFormat,
 }
 
 impl fmt::Debug for NewWebhookView {
@@ -84,13 +89,15 @@ pub struct ChannelView {
     pub kind: ChannelKind,
     /// URL of a webhook; null for e-mail.
     pub url: Option<String>,
+    /// Format of a webhook; null for e-mail.
+    pub format: Option<WebhookFormat>,
     /// Settings of an e-mail; null for a webhook.
     pub email: Option<EmailView>,
     /// Time of creation, RFC 3339.
     pub created_at: String,
     /// Deliveries that wait for their turn or their next attempt.
     pub pending: u64,
-    /// Deliveries that were given up, of the last 1000.
+    /// Failed deliveries, which are not retried any more, of the last 1000.
     pub given_up: u64,
 }
 
@@ -120,7 +127,12 @@ pub struct MadeChannelView {
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StoredChannel {
-    Webhook { url: String, secret: String },
+    Webhook {
+        url: String,
+        secret: String,
+        #[serde(default)]
+        format: WebhookFormat,
+    },
     Email(StoredEmail),
 }
 
@@ -186,6 +198,12 @@ pub struct NewRuleView {
     #[serde(default)]
     #[schema(minimum = 60, maximum = 604_800)]
     pub repeat_s: Option<u32>,
+    /// Seconds for which the fault must fail without an acknowledgement before the first message
+    /// is sent, 1 to 86 400; null or absent for no delay. A fault that passes earlier has no
+    /// message.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(minimum = 1, maximum = 86_400)]
+    pub delay_s: Option<u32>,
     #[serde(default = "yes")]
     pub enabled: bool,
 }
@@ -237,7 +255,7 @@ pub struct DeliveryView {
     pub created_at: String,
     /// Time of the next attempt, RFC 3339; null if it is finished.
     pub next_attempt_at: Option<String>,
-    /// Time at which it was delivered or given up, RFC 3339; null before.
+    /// Time at which it was delivered or failed for good, RFC 3339; null before.
     pub finished_at: Option<String>,
     /// Why the last attempt failed; null if it did not.
     pub error: Option<String>,
@@ -253,6 +271,7 @@ pub struct NotificationView {
     /// The asset.
     pub source: String,
     /// `org.offbd.fault.CHANGE.v1` with a change such as `confirmed`,
+    /// `org.offbd.fault.updated.v1` for a kind that is known later,
     /// `org.offbd.fault.reminder.v1`, or `org.offbd.test.v1`.
     #[serde(rename = "type")]
     pub kind: String,
@@ -275,9 +294,13 @@ pub struct NotificationDataView {
     pub link: Option<String>,
     /// Checks to make.
     pub advice: Vec<String>,
+    /// Id of the message of which this one is an update: it adds the kind of the fault; null for
+    /// others.
+    #[serde(default)]
+    pub updates: Option<String>,
     /// The event; null for a test.
     #[schema(value_type = Option<NotifiedEventView>)]
-    pub event: serde_json::Value,
+    pub event: Value,
 }
 
 /// The event of which a message tells.
@@ -302,14 +325,51 @@ impl NotificationView {
     #[must_use]
     pub fn title(&self) -> String {
         let change = self.kind.trim_start_matches("org.offbd.").trim_end_matches(".v1");
-        let change = change.trim_start_matches("fault.");
+        let change = match change.trim_start_matches("fault.") {
+            "pending" => "suspected",
+            change => change,
+        };
         match self.data.asset.as_str() {
             "" => "[offbd] test".to_owned(),
             asset => format!("[offbd] {asset}: {} {change}", self.subject.replace('_', " ")),
         }
     }
 
-    /// Returns the text of an e-mail.
+    /// Returns the media type and the body of a webhook's request.
+    #[must_use]
+    pub fn posted(&self, format: WebhookFormat) -> (&'static str, String) {
+        const JSON: &str = "application/json";
+        match format {
+            WebhookFormat::CloudEvents => {
+                let body = serde_json::to_string(self).unwrap_or_default();
+                ("application/cloudevents+json", body)
+            }
+            WebhookFormat::Slack => {
+                (JSON, json!({ "text": escaped_for_slack(&self.text()) }).to_string())
+            }
+            WebhookFormat::Teams => (JSON, self.card().to_string()),
+            WebhookFormat::Text => ("text/plain; charset=utf-8", self.text()),
+        }
+    }
+
+    /// The message as an adaptive card in the envelope that a workflow of Teams takes.
+    fn card(&self) -> Value {
+        let block = |text: &str| json!({ "type": "TextBlock", "text": text, "wrap": true });
+        let mut blocks = vec![
+            json!({ "type": "TextBlock", "text": self.title(), "wrap": true, "weight": "bolder" }),
+            block(&self.data.summary),
+        ];
+        blocks.extend(self.data.advice.iter().map(|check| block(&format!("- {check}"))));
+        let open = |url: &String| json!({ "type": "Action.OpenUrl", "title": "Open", "url": url });
+        let actions: Vec<Value> = self.data.link.iter().map(open).collect();
+        json!({ "type": "message", "attachments": [{
+            "contentType": "application/vnd.microsoft.card.adaptive",
+            "content": { "$schema": "http://adaptivecards.io/schemas/adaptive-card.json",
+                "type": "AdaptiveCard", "version": "1.4", "body": blocks, "actions": actions },
+        }] })
+    }
+
+    /// Returns the text for people: of an e-mail, and of a webhook in the formats for people.
     #[must_use]
     pub fn text(&self) -> String {
         let mut lines = vec![self.data.summary.clone(), String::new()];
@@ -322,5 +382,51 @@ impl NotificationView {
         lines.push(format!("Time: {}", self.time));
         lines.push(format!("Message: {}", self.id));
         lines.join("\n")
+    }
+}
+
+/// Replaces the characters that begin and end markup in Slack.
+fn escaped_for_slack(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_is_posted_in_the_format_of_the_channel() {
+        let message = NotificationView {
+            specversion: "1.0".to_owned(),
+            id: "evt_7".to_owned(),
+            source: String::new(),
+            kind: "org.offbd.fault.confirmed.v1".to_owned(),
+            subject: "x_servo".to_owned(),
+            time: "2026-05-04T12:00:00Z".to_owned(),
+            datacontenttype: "application/json".to_owned(),
+            data: NotificationDataView {
+                asset: "rig-7".to_owned(),
+                summary: "rig-7: 0.2 < 0.3 & so on".to_owned(),
+                link: Some("https://offbd.example/rigs/rig-7/faults/x_servo".to_owned()),
+                advice: vec!["Does the servo have power?".to_owned()],
+                updates: None,
+                event: Value::Null,
+            },
+        };
+        let posted = |format| message.posted(format);
+        let json = |format| serde_json::from_str::<Value>(&posted(format).1).unwrap();
+        let (media_type, _) = posted(WebhookFormat::CloudEvents);
+        assert_eq!(media_type, "application/cloudevents+json");
+        assert_eq!(json(WebhookFormat::CloudEvents)["id"], "evt_7");
+        let slack = json(WebhookFormat::Slack);
+        let text = slack["text"].as_str().unwrap();
+        assert!(text.starts_with("rig-7: 0.2 &lt; 0.3 &amp; so on\n"), "{text}");
+        let card = &json(WebhookFormat::Teams)["attachments"][0]["content"];
+        assert_eq!(card["body"][0]["text"], "[offbd] rig-7: x servo confirmed");
+        assert_eq!(card["body"][2]["text"], "- Does the servo have power?");
+        assert_eq!(card["actions"][0]["url"], "https://offbd.example/rigs/rig-7/faults/x_servo");
+        let (media_type, plain) = posted(WebhookFormat::Text);
+        assert_eq!(media_type, "text/plain; charset=utf-8");
+        assert_eq!(plain, message.text());
     }
 }

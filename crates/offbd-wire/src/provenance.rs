@@ -33,7 +33,7 @@ pub struct OccurrenceView {
     pub session_id: String,
     /// Time at which the service judged the sample at which the test failed, RFC 3339.
     pub noted_at: String,
-    /// Id of the calibration that was used; null if the rig was not learnt.
+    /// Id of the calibration that was used; null if the rig was not calibrated.
     pub calibration_id: Option<String>,
     /// Id of the profile, settings and rig description that were used.
     pub settings_id: String,

@@ -31,7 +31,7 @@ pub struct RecordingView {
     /// Whether the interval is complete: false while the session is open and samples of the
     /// interval may still arrive.
     pub complete: bool,
-    /// Id of the calibration that was used; null if the rig was not learnt.
+    /// Id of the calibration that was used; null if the rig was not calibrated.
     pub calibration_id: Option<String>,
     /// Id of the profile, settings and rig description that were used.
     pub settings_id: String,

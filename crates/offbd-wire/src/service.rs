@@ -63,7 +63,7 @@ pub struct SessionView {
 /// The calibration that a session is judged with: that of the rig when it was opened.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct SessionCalibrationView {
-    /// Null if the rig was not learnt.
+    /// Null if the rig was not calibrated.
     pub calibration: Option<super::asset::CalibrationView>,
 }
 
@@ -84,6 +84,10 @@ pub struct FaultEntryView {
     /// Whether the asset has an open session; null in lists of several assets.
     #[serde(default)]
     pub session_open: Option<bool>,
+    /// Time at which the last data of the asset arrived, RFC 3339, if data have stopped during an
+    /// open session; null otherwise, and in lists of several assets.
+    #[serde(default)]
+    pub communication_lost_since: Option<String>,
 }
 
 /// An event: a person cleared a code while no session was open. It has the keys of a fault
@@ -157,7 +161,7 @@ pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
         axis: code.axis().map(AxisWord::from),
         command: code.axis().map(CommandWord::from),
         by: by.to_owned(),
-        summary: format!("{code} cleared by {by}: nothing of it is on record"),
+        summary: format!("{code} cleared by {by}"),
     }
 }
 
@@ -189,8 +193,8 @@ pub struct FleetEntryView {
     /// Delay of the last batch, relative to the smallest delay of a batch in the session, s;
     /// null until a batch arrives.
     pub lag_s: Option<f64>,
-    /// Why the rig is not tested at present: many of its latest samples are not judged; null
-    /// if they are.
+    /// How many of its latest samples could not be used, and why, if these are so many that the
+    /// rig is not tested at present; else null.
     #[serde(default)]
     pub unjudged: Option<UnjudgedView>,
     /// Pending and confirmed faults, also those of muted monitors.
@@ -363,8 +367,8 @@ pub struct StateView {
     /// Number of samples that wait for an earlier one, or until a jump of the clock is
     /// confirmed.
     pub waiting: usize,
-    /// Why the rig is not tested at present: many of its latest samples are not judged, and the
-    /// evidence is that of the others; null if they are judged.
+    /// How many of its latest samples could not be used, and why, if these are so many that the
+    /// rig is not tested at present; the evidence is that of the others. Else null.
     #[serde(default)]
     pub unjudged: Option<UnjudgedView>,
     /// The twin's ball position relative to the plate, m.
@@ -520,7 +524,7 @@ pub struct ReplayResultView {
     pub tally: TallyView,
     /// The transitions that differ, with their fault lines.
     pub differences: Vec<DifferenceView>,
-    /// Id of the calibration used by the replay; null if the rig was not learnt.
+    /// Id of the calibration used by the replay; null if the rig was not calibrated.
     #[serde(default)]
     pub calibration_id: Option<String>,
     /// Id of the profile, settings and rig description used by the replay.

@@ -9,10 +9,10 @@
 
 #[cfg(feature = "parquet")]
 mod arrow;
-#[cfg(any(feature = "mcap", feature = "parquet", feature = "xlsx"))]
 mod byte_budget;
 #[cfg(feature = "parquet")]
 mod columns;
+mod joined;
 pub(crate) mod json;
 mod line;
 #[cfg(feature = "mcap")]
@@ -25,6 +25,7 @@ mod mcap_scene;
 mod parquet;
 #[cfg(feature = "parquet")]
 mod parquet_pages;
+mod shared_source;
 #[cfg(feature = "parquet")]
 mod trace_columns;
 mod trace_writer;
@@ -33,6 +34,7 @@ mod workbook_check;
 #[cfg(feature = "xlsx")]
 pub(crate) mod xlsx;
 
+pub use joined::JoinedRows;
 pub use trace_writer::TraceWriter;
 
 use std::fmt;
@@ -42,7 +44,7 @@ use offbd_core::vocabulary::Sample;
 use serde::{Deserialize, Serialize};
 
 use super::session_csv;
-use super::table::{CsvError, RowError, TableOptions, TableReader};
+use super::table::{CsvError, NamedColumns, RowError, TableOptions, TableReader};
 use super::telemetry::sample_view;
 
 /// A format of session files.
@@ -214,14 +216,10 @@ pub enum SessionFileError {
     Foreign { what: &'static str, advice: &'static str },
     #[error("{0} files are only read, not written")]
     NotWritten(SessionFormat),
-    #[error("there is no column `{0}`; required: t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m")]
-    NoColumn(&'static str),
-    #[error("there are two columns `{0}`")]
-    TwoColumns(&'static str),
     /// The column is not numeric; `found` is its type.
     #[error("the column `{column}` has the type {found}, not a number")]
-    NotANumber { column: &'static str, found: String },
-    /// The first sheet of a workbook is no session.
+    NotANumber { column: String, found: String },
+    /// The first sheet of a workbook is not a session.
     #[error("sheet `{sheet}`: {reason}")]
     Sheet { sheet: String, reason: String },
     /// A file that is a part of a recording and cannot be read, or does not continue the others.
@@ -229,9 +227,12 @@ pub enum SessionFileError {
     Part { file: String, reason: String },
     #[error("the JSON document is not a recording: {0}")]
     Json(String),
-    /// An MCAP file without a topic of the schema.
-    #[error("there is no topic with JSON messages of the schema `{0}`")]
-    NoTopic(&'static str),
+    /// An MCAP file without a topic of the schema, or with several others.
+    #[error(
+        "the file has no topic with JSON messages of the schema `{schema}`, and {found}; a \
+         recording is read from one topic"
+    )]
+    NoTopic { schema: &'static str, found: String },
     #[error("the file cannot be read: {0}")]
     Io(#[from] io::Error),
     #[error("the {format} file is damaged, or was not written to its end: {reason}")]
@@ -249,7 +250,6 @@ pub enum SessionFileError {
 }
 
 /// Runs a part of a library's reader, whose panic means that the file contradicts itself.
-#[cfg(any(feature = "parquet", feature = "mcap", feature = "xlsx"))]
 fn guarded<T>(format: SessionFormat, read: impl FnOnce() -> T) -> Result<T, SessionFileError> {
     IS_GUARDED.set(true);
     let read = std::panic::catch_unwind(std::panic::AssertUnwindSafe(read));
@@ -300,7 +300,7 @@ impl fmt::Display for RejectedRow {
     }
 }
 
-/// Why the next row is no sample.
+/// Why the next row is not a sample.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionRowError {
     /// The row is rejected, and the next one can be read.
@@ -317,15 +317,15 @@ pub trait SessionRows: Iterator<Item = Result<Sample, SessionRowError>> + Send {
     /// The place of the row read last.
     fn place(&self) -> RowPlace;
 
-    /// The number of runs that have begun, from 1: in a text, a clock that starts again and a second
-    /// header begin another one.
+    /// The number of runs that have begun, from 1: a clock that starts again and a second header begin
+    /// another one.
     fn n_runs(&self) -> usize {
         1
     }
 }
 
 /// Opens the session file `source`. Without `format` its first bytes say what it is. `options` say
-/// how a text and a sheet are read; the columns of other formats have the names of the quantities.
+/// which columns are read.
 ///
 /// # Errors
 /// [`SessionFileError`] if this build does not read the format, a column is missing or has
@@ -352,31 +352,55 @@ pub fn open<S: Read + Seek + Send + 'static>(
     }
     source.seek(SeekFrom::Start(0))?;
     match format {
-        #[cfg(feature = "parquet")]
-        SessionFormat::Parquet => Ok(Box::new(parquet::rows(source)?)),
-        #[cfg(feature = "parquet")]
-        SessionFormat::Arrow => Ok(Box::new(arrow::ArrowRows::new(source)?)),
-        #[cfg(feature = "mcap")]
-        SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapRows::new(source)?)),
         #[cfg(feature = "xlsx")]
         SessionFormat::Xlsx => {
             let xlsx::Sheet { name, text } = xlsx::sheet(source)?;
             Ok(Box::new(TextRows::new(TextKind::Sheet(name), io::Cursor::new(text), options)?))
         }
+        _ => Ok(Box::new(column_file(source, format)?.rows(options)?)),
+    }
+}
+
+/// Opens a file whose columns have names and types.
+///
+/// # Errors
+/// [`SessionFileError`] if this build does not read the format, or the file is damaged.
+pub(crate) fn column_file<S: Read + Seek + Send + 'static>(
+    source: S,
+    format: SessionFormat,
+) -> Result<Box<dyn ColumnFile>, SessionFileError> {
+    match format {
+        #[cfg(feature = "parquet")]
+        SessionFormat::Parquet => Ok(Box::new(parquet::ParquetTable::open(source)?)),
+        #[cfg(feature = "parquet")]
+        SessionFormat::Arrow => Ok(Box::new(arrow::ArrowTable::open(source)?)),
+        #[cfg(feature = "mcap")]
+        SessionFormat::Mcap => Ok(Box::new(mcap_rows::McapTable::open(source)?)),
         _ => Err(format.not_built()),
     }
 }
 
-/// What a text was in the file.
+/// What a table was in the file.
 #[derive(Clone, Debug)]
 pub(crate) enum TextKind {
     /// The file, whose rows are known by their lines.
     Text,
-    /// A JSON document, whose first row comes after this many lines.
-    Json { n_before: u64 },
+    /// Rows, of which the first comes after this many lines.
+    Rows { n_before: u64 },
     /// The sheet of this name.
-    #[cfg_attr(not(feature = "xlsx"), expect(dead_code, reason = "of workbooks"))]
     Sheet(String),
+}
+
+/// A file whose columns have names and types, and that can be read more than once.
+pub(crate) trait ColumnFile {
+    /// The names of the columns and the first rows.
+    fn columns(&self) -> &NamedColumns;
+
+    /// Opens the rows by `options`.
+    ///
+    /// # Errors
+    /// [`SessionFileError`] if a column is missing or has another type, or the file is damaged.
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'static>, SessionFileError>;
 }
 
 /// The rows of a text, or of another file that is read as one.
@@ -404,10 +428,15 @@ impl<'a> TextRows<'a> {
         }
     }
 
+    /// Reads a table with names and types.
+    const fn of_columns(rows: TableReader<'a>) -> Self {
+        Self { kind: TextKind::Rows { n_before: 0 }, rows }
+    }
+
     fn place_of(&self, line: u64) -> RowPlace {
         match self.kind {
             TextKind::Text => RowPlace::Line(line),
-            TextKind::Json { n_before } => RowPlace::Row(line.saturating_sub(n_before)),
+            TextKind::Rows { n_before } => RowPlace::Row(line.saturating_sub(n_before)),
             TextKind::Sheet(_) => RowPlace::Row(line),
         }
     }
@@ -417,11 +446,13 @@ impl Iterator for TextRows<'_> {
     type Item = Result<Sample, SessionRowError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let row = self.rows.next()?;
+        let Some(row) = self.rows.next() else {
+            return self.rows.take_fault().map(|error| Err(SessionRowError::Unreadable(error)));
+        };
         Some(row.map_err(|RowError { line, reason }| {
             let reason = match &self.kind {
                 TextKind::Sheet(name) => format!("sheet `{name}`, {reason}"),
-                TextKind::Text | TextKind::Json { .. } => reason,
+                TextKind::Text | TextKind::Rows { .. } => reason,
             };
             SessionRowError::Rejected(RejectedRow { place: self.place_of(line), reason })
         }))
@@ -440,12 +471,10 @@ impl SessionRows for TextRows<'_> {
 
 /// Times of a device's clock, s, that are seconds since 1970: from 2000 to 2100. A clock that counts
 /// from the start of the device would have to run for 30 years.
-#[cfg(feature = "parquet")]
 const UNIX_TIMES_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
 /// Returns the absolute time of `t_s` on the device's clock, µs since 1970; `None` if that does not
 /// count from 1970.
-#[cfg(feature = "parquet")]
 fn unix_micros(t_s: f64) -> Option<i64> {
     UNIX_TIMES_S.contains(&t_s).then(|| (t_s * 1e6).round() as i64)
 }
@@ -469,7 +498,6 @@ pub struct SessionInfo {
 
 impl SessionInfo {
     /// Keys and values, for the metadata of a file.
-    #[cfg(any(feature = "parquet", feature = "mcap"))]
     fn entries(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let entries = [
             ("offbd.session", Some(self.session.as_str())),

@@ -10,8 +10,8 @@ use utoipa::ToSchema;
 use super::asset::AssetView;
 use super::memory::{FaultRecordView, StatusBitsView};
 use super::service::{FaultEntryView, SessionView, StateView};
-use super::verdict::EvidenceView;
-use super::words::{CodeWord, StatusWord};
+use super::verdict::{CandidateView, EvidenceView, fault_title, is_probable, kind_weight};
+use super::words::{CodeWord, KindWord, StatusWord};
 
 /// The versions of SOVD that the service speaks.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -53,6 +53,15 @@ pub struct SovdReferenceView {
     pub href: String,
 }
 
+/// The service as the root of the entities.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct SovdRootView {
+    pub id: String,
+    pub name: String,
+    /// Path of the components.
+    pub components: String,
+}
+
 /// A component: one rig.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct SovdComponentView {
@@ -81,6 +90,7 @@ pub struct SovdFaultView {
     pub scope: String,
     /// Code and kind.
     pub display_code: String,
+    /// Name for people; with its kind and the likelihood while this kind is only probable.
     pub fault_name: String,
     /// 2 (error) if the fault is confirmed, else 3 (warning).
     pub severity: u32,
@@ -308,21 +318,30 @@ impl SovdStatusView {
 pub fn fault_item(entry: &FaultEntryView) -> SovdFaultView {
     let record = &entry.record;
     let symptom = record.kind.map(|kind| kind.to_string());
-    let fault_name = match record.code {
-        CodeWord::XServo => "x servo",
-        CodeWord::YServo => "y servo",
-        CodeWord::StuckBall => "stuck ball",
-        CodeWord::Sensor => "position sensor",
-    };
     let kind = symptom.as_ref().map(|kind| format!(":{kind}")).unwrap_or_default();
     SovdFaultView {
         code: record.code,
         scope: SCOPE.to_owned(),
         display_code: format!("{}{kind}", record.code),
-        fault_name: fault_name.to_owned(),
+        fault_name: fault_name(record.code, record.kind, &record.candidates),
         severity: if record.status_bits.confirmed { 2 } else { 3 },
         symptom,
         status: status_view(record),
+    }
+}
+
+/// The name of a fault for people.
+fn fault_name(code: CodeWord, kind: Option<KindWord>, candidates: &[CandidateView]) -> String {
+    let name = match code {
+        CodeWord::XServo => "x servo",
+        CodeWord::YServo => "y servo",
+        CodeWord::StuckBall => "stuck ball",
+        CodeWord::Sensor => "position sensor",
+    };
+    let weight = kind_weight(kind, candidates.iter().map(|each| (each.kind, each.weight)));
+    match weight.filter(|&weight| is_probable(weight)) {
+        Some(weight) => fault_title(name, kind, weight),
+        None => name.to_owned(),
     }
 }
 
@@ -368,5 +387,20 @@ pub fn fault_detail(
         item: fault_item(&entry),
         environment_data: (with_extended || with_snapshots).then_some(environment),
         record: Box::new(entry),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The symptom is a word for programs; the name tells people how sure it is.
+    #[test]
+    fn the_name_tells_that_a_kind_is_only_probable() {
+        let (code, kind) = (CodeWord::XServo, Some(KindWord::Dead));
+        let of = |weight| fault_name(code, kind, &[CandidateView { code, kind, weight }]);
+        assert_eq!(of(0.512), "x servo (probably dead, 51 %)");
+        assert_eq!(of(0.9), "x servo");
+        assert_eq!(fault_name(code, kind, &[]), "x servo");
     }
 }

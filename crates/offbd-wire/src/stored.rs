@@ -346,7 +346,7 @@ mod tests {
         let answer = Some(ServoAnswer { gain: 0.5, ..ServoAnswer::default() });
         let stored = serde_json::to_string(&AxisEvidence { answer, ..axis }).unwrap();
         let names = "command_rad position_m velocity_m_s measured_m_s2 twin_m_s2 limit_m_s2 enabled
-            nats path_error_m path_limit_m answer offset_m_s2 offset_error_m_s2 gain gain_error
+            nats path_nats path_limit_nats answer offset_m_s2 offset_error_m_s2 gain gain_error
             delay_s delay_error_s likelihoods identical_s";
         let found: Vec<&str> = stored.split('"').skip(1).step_by(2).collect();
         assert_eq!(found, names.split_whitespace().collect::<Vec<_>>());

@@ -30,7 +30,10 @@ pub use self::inspection::{
 use self::clock::RowClock;
 use self::columns::BoundMapping;
 use self::dialect::Dialect;
-use self::rows::{Cells, Rows};
+pub(crate) use self::dialect::{JUDGED_ROWS, NamedColumns};
+use self::rows::Rows;
+pub(crate) use self::rows::{Cells, RowFault, RowSource};
+use crate::session_file::SessionFileError;
 use offbd_core::vocabulary::{Brief, Sample};
 
 /// The rates that a table without a time may have, rows a second. Chosen: from a row in a quarter of
@@ -122,7 +125,11 @@ fn find_table<'a>(mut source: impl Read + Send + 'a) -> Result<OpenedTable<'a>, 
     source.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut raw)?;
     let (encoding, mark) = encoding::detect(&raw);
     raw.drain(..mark);
+    let has_lines = raw.contains(&b'\n');
     let mut text = encoding::as_utf8(Cursor::new(raw).chain(source), encoding);
+    if !has_lines {
+        text = Box::new(encoding::WithLines(text));
+    }
     let mut head = Vec::new();
     text.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut head)?;
     let is_whole = head.len() < dialect::HEAD_BYTES;
@@ -135,9 +142,17 @@ fn find_table<'a>(mut source: impl Read + Send + 'a) -> Result<OpenedTable<'a>, 
     })
 }
 
+/// Checks the times of the column `t_s` of a table, unless `options` say where the time is.
+fn check_time_unit(dialect: &Dialect, options: &TableOptions) -> Result<(), CsvError> {
+    let is_named = options.columns.expressions[0].is_none() && options.rate_hz.is_none();
+    guess::wrong_time_unit(dialect).filter(|_| is_named).map_or(Ok(()), Err)
+}
+
 /// Reads samples row by row, in the order of the file.
 pub struct TableReader<'a> {
-    rows: Rows<'a>,
+    rows: Box<dyn RowSource + 'a>,
+    /// Why the rest of the file cannot be read.
+    fault: Option<SessionFileError>,
     dialect: Dialect,
     mapping: BoundMapping,
     clock: RowClock,
@@ -145,12 +160,20 @@ pub struct TableReader<'a> {
 }
 
 impl<'a> TableReader<'a> {
-    /// Opens a batch, whose rows may be of any time.
+    /// Opens a batch, whose columns have the names of the quantities and whose rows may be of any
+    /// time.
     ///
     /// # Errors
     /// [`CsvError`] if a column is missing or repeated, or `source` cannot be read.
     pub fn batch(source: impl Read + Send + 'a) -> Result<Self, CsvError> {
         Self::new(find_table(source)?, &TableOptions::default(), false)
+    }
+
+    /// The names of the columns that are not read.
+    pub fn unread(&self) -> impl Iterator<Item = &str> {
+        let read = self.mapping.columns();
+        let names = self.dialect.names.iter().enumerate();
+        names.filter(move |(i, _)| !read.contains(i)).map(|(_, name)| name.as_str())
     }
 
     /// Opens a recording. A counter that wraps goes on; a clock that starts again, and a second
@@ -165,11 +188,25 @@ impl<'a> TableReader<'a> {
     ) -> Result<Self, CsvError> {
         let table = find_table(source)?;
         let options = &options.of_table(&table.dialect);
-        let is_named = options.columns.expressions[0].is_none() && options.rate_hz.is_none();
-        if is_named && let Some(error) = guess::wrong_time_unit(&table.dialect) {
-            return Err(error);
-        }
+        check_time_unit(&table.dialect, options)?;
         Self::new(table, options, true)
+    }
+
+    /// Opens a recording that is not a text; `rows` opens its rows, of which these columns are read.
+    ///
+    /// # Errors
+    /// As of [`Self::recording`], and those of `rows`.
+    pub(crate) fn of_columns<R: RowSource + 'a>(
+        columns: &NamedColumns,
+        options: &TableOptions,
+        rows: impl FnOnce(&[usize]) -> Result<R, SessionFileError>,
+    ) -> Result<Self, SessionFileError> {
+        let dialect = Dialect::of_columns(columns);
+        let options = &options.of_table(&dialect);
+        check_time_unit(&dialect, options)?;
+        let mapping = BoundMapping::new(&dialect, options)?;
+        let rows = Box::new(rows(&mapping.columns())?);
+        Ok(Self::of(rows, dialect, mapping, true))
     }
 
     fn new(
@@ -180,8 +217,22 @@ impl<'a> TableReader<'a> {
         let OpenedTable { dialect, rows, .. } = table;
         let mapping = BoundMapping::new(&dialect, options)?;
         let rows = Rows::new(rows, dialect.separator, dialect.comment, dialect.n_lines);
+        Ok(Self::of(Box::new(rows), dialect, mapping, is_recording))
+    }
+
+    fn of(
+        rows: Box<dyn RowSource + 'a>,
+        dialect: Dialect,
+        mapping: BoundMapping,
+        is_recording: bool,
+    ) -> Self {
         let clock = RowClock::new(is_recording);
-        Ok(Self { rows, dialect, mapping, clock, cells: Cells::default() })
+        Self { rows, fault: None, dialect, mapping, clock, cells: Cells::default() }
+    }
+
+    /// Takes the reason why the rest of the file could not be read, after the last row.
+    pub(crate) fn take_fault(&mut self) -> Option<SessionFileError> {
+        self.fault.take()
     }
 
     /// Returns the line number of the row read last, from 1, counting the header.
@@ -199,24 +250,36 @@ impl<'a> TableReader<'a> {
     fn sample(&mut self) -> Result<Sample, RowError> {
         let line = self.line();
         let fail = |reason: String| RowError { line, reason };
+        if self.dialect.has_labels {
+            self.cells.strip_labels(&self.dialect.names).map_err(fail)?;
+        }
         let has_commas = self.dialect.has_decimal_commas;
         let t_s = self.clock.next(&self.mapping.time, &self.cells, has_commas).map_err(fail)?;
         let value = |quantity: usize| match &self.mapping.quantities[quantity] {
             None => Ok(None),
             Some(columns) => columns.value(&self.cells, has_commas).map_err(fail),
         };
-        let seq = match self.mapping.seq.and_then(|i| self.cells.get(i)).map(cell::bare) {
-            None | Some(b"") => None,
-            Some(bytes) => Some(
-                std::str::from_utf8(bytes)
-                    .ok()
-                    .and_then(|s| s.parse().ok())
-                    .ok_or_else(|| fail("`seq` is not a whole number".to_owned()))?,
-            ),
-        };
+        let seq = self.mapping.seq.map_or(Ok(None), |column| self.seq(column)).map_err(fail)?;
         let [cmd_qx_rad, cmd_qy_rad, x_m, y_m] = [value(0)?, value(1)?, value(2)?, value(3)?];
         self.clock.note(t_s);
         Ok(Sample { seq, t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m })
+    }
+
+    /// The number of the sample, which data frames with missing ones keep as a floating-point number.
+    fn seq(&self, column: usize) -> Result<Option<u64>, String> {
+        let number = self.cells.number(column).map(|number| number.to_string());
+        let bytes = number.as_ref().map_or_else(|| self.cells.get(column), |n| Some(n.as_bytes()));
+        match bytes.map(cell::bare) {
+            None => Ok(None),
+            Some(bytes) => match std::str::from_utf8(bytes) {
+                Ok(text) if cell::is_missing(text) => Ok(None),
+                text => text
+                    .ok()
+                    .and_then(|text| text.parse().ok())
+                    .map(Some)
+                    .ok_or_else(|| "`seq` is not a whole number".to_owned()),
+            },
+        }
     }
 
     /// Whether the row repeats the header.
@@ -240,8 +303,12 @@ impl Iterator for TableReader<'_> {
                 Ok(true) if self.is_header() => self.clock.restart(),
                 Ok(true) => return Some(self.sample()),
                 Ok(false) => return None,
-                Err(e) => {
-                    return Some(Err(RowError { line: self.line(), reason: e.to_string() }));
+                Err(RowFault::Rejected(reason)) => {
+                    return Some(Err(RowError { line: self.line(), reason }));
+                }
+                Err(RowFault::Unreadable(error)) => {
+                    self.fault = Some(error);
+                    return None;
                 }
             }
         }

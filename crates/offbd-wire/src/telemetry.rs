@@ -7,9 +7,7 @@
 
 mod cells;
 mod format;
-mod lenient;
-
-use std::io::Read;
+pub(crate) mod lenient;
 
 use serde::de::DeserializeSeed;
 use serde::{Deserialize, Serialize};
@@ -112,13 +110,6 @@ pub fn ndjson(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
 }
 
 /// Parses one sample object.
-///
-/// # Errors
-/// The reason why the row is invalid.
-pub fn json_row(document: &[u8]) -> Result<Sample, String> {
-    row(document, &UnknownKeys::default())
-}
-
 fn row(document: &[u8], unknown: &UnknownKeys) -> Result<Sample, String> {
     let parse = |document: &[u8]| {
         let mut json = serde_json::Deserializer::from_slice(document);
@@ -148,26 +139,22 @@ fn named(unknown: UnknownKeys) -> Vec<UnknownKeyView> {
     unknown.into_names().into_iter().map(view).collect()
 }
 
-/// Parses CSV with the header of a session file, with at most `limit` rows.
+/// Parses CSV with the header of a session file, with at most `limit` rows. Other columns are
+/// unknown keys.
 ///
 /// # Errors
 /// [`BatchError`] if the header is not that of a session file, or there are too many rows.
 pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
-    let mut rows = Vec::new();
-    for row in csv_rows(document)? {
-        check_length(rows.len() + 1, limit)?;
-        rows.push(row);
-    }
-    Ok(Batch { rows, ..Batch::default() })
-}
-
-/// Parses CSV with the header of a session file, row by row.
-fn csv_rows<'a>(
-    document: impl Read + Send + 'a,
-) -> Result<impl Iterator<Item = Result<Sample, String>>, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
     let reader = TableReader::batch(document).map_err(|e| malformed(e.to_string()))?;
-    Ok(reader.map(|row| file_row(row.map_err(|e| e.to_string()))))
+    let unknown = UnknownKeys::default();
+    reader.unread().for_each(|name| unknown.note(name));
+    let mut rows = Vec::new();
+    for row in reader {
+        check_length(rows.len() + 1, limit)?;
+        rows.push(file_row(row.map_err(|e| e.to_string())));
+    }
+    Ok(Batch { rows, unknown: named(unknown), ..Batch::default() })
 }
 
 /// Returns a row of a session file as one of a batch: its `seq` is checked, and a reason is

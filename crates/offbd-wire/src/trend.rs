@@ -12,7 +12,7 @@ use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct TrendsView {
     pub asset: String,
-    /// Id of the calibration in the asset file; null if the rig is not learnt, and then there
+    /// Id of the calibration in the asset file; null if the rig is not calibrated, and then there
     /// are no trends.
     pub calibration_id: Option<String>,
     /// Estimates of the last 200 sessions, oldest first.
@@ -31,7 +31,7 @@ pub struct TrendPointView {
     pub session_id: Option<String>,
     /// Time at which the session was ended, RFC 3339; null for a file.
     pub ended_at: Option<String>,
-    /// Id of the calibration that was used; null if the rig was not learnt.
+    /// Id of the calibration that was used; null if the rig was not calibrated.
     pub calibration_id: Option<String>,
     /// Number of samples of the session.
     pub samples: u64,

@@ -1,10 +1,12 @@
 //! The lines of a verdict: one per transition and a summary, with a hash that depends only
 //! on the recording, not on how it was delivered.
 
+mod kind_words;
 mod outcome;
 mod sentence;
 
-pub use outcome::{JudgedView, Outcome};
+pub use kind_words::{fault_title, is_probable, kind_words, status_words};
+pub use outcome::{JudgedView, NamedKindView, Outcome};
 pub use sentence::sentence;
 
 use data_encoding::HEXLOWER;
@@ -18,7 +20,7 @@ use offbd_core::diagnosis::{
     AxisEvidence, Candidate, Evidence, ServoAnswer, Suspicion, Transition,
 };
 use offbd_core::engine::Misfit;
-use offbd_core::vocabulary::{FaultCode, FaultStatus};
+use offbd_core::vocabulary::{FaultCode, FaultKind, FaultStatus};
 
 /// A transition: a change of a fault's status. If the kind of a fault is determined only
 /// after its confirmation, a further line with an unchanged status gives it.
@@ -46,7 +48,7 @@ pub struct FaultView {
     pub command: Option<CommandWord>,
     /// Causes that would explain the evidence equally; empty if there is only one.
     pub candidates: Vec<CandidateView>,
-    /// Id of the calibration that was used; null if the rig was not learnt.
+    /// Id of the calibration that was used; null if the rig was not calibrated.
     #[serde(default)]
     pub calibration_id: Option<String>,
     /// Id of the profile, settings and rig description that were used.
@@ -56,6 +58,14 @@ pub struct FaultView {
     pub summary: String,
     /// The quantities at that time.
     pub evidence: EvidenceView,
+}
+
+impl FaultView {
+    /// Whether the test of the fault fails: bit 0 of the status byte.
+    #[must_use]
+    pub fn is_failing(&self) -> bool {
+        u8::from_str_radix(&self.status_byte, 16).is_ok_and(|byte| byte & 1 == 1)
+    }
 }
 
 /// A possible cause and its weight.
@@ -104,7 +114,7 @@ pub struct EvidenceView {
     /// Standard deviation of the readings about their fit, m; null if unknown.
     pub scatter_m: Option<f64>,
     /// Standard deviation of healthy readings, the larger of both axes, m: learnt, or assumed
-    /// if the rig is not learnt.
+    /// if the rig is not calibrated.
     #[serde(default)]
     pub healthy_scatter_m: f64,
     /// The jump of the readings that is attributed to the sensor; null if there is none.
@@ -144,13 +154,14 @@ pub struct AxisEvidenceView {
     /// broken and a healthy servo, nats.
     #[serde(default)]
     pub nats: f64,
-    /// Path error: root mean square deviation of the path of the last two seconds from the
-    /// twin's, apart from a parabola with one kink, m; null if it cannot be tested.
+    /// Evidence of the path of the last seconds for a fault of the servo, nats, in which the
+    /// scale of the twin's error is the session's own; negative if the path speaks for a
+    /// healthy servo, null if it cannot be tested.
     #[serde(default)]
-    pub path_error_m: Option<f64>,
-    /// Largest path error expected of a healthy rig, m; null if unknown.
+    pub path_nats: Option<f64>,
+    /// Evidence of the path from which on the servo fails, nats; null if unknown.
     #[serde(default)]
-    pub path_limit_m: Option<f64>,
+    pub path_limit_nats: Option<f64>,
     /// Recent parameters of the servo; null if the profile does not estimate them.
     #[serde(default)]
     pub answer: Option<AnswerView>,
@@ -295,8 +306,8 @@ fn axis_evidence_view(axis: &AxisEvidence) -> AxisEvidenceView {
         limit_m_s2: axis.limit_m_s2,
         enabled: axis.enabled,
         nats: axis.nats,
-        path_error_m: axis.path_error_m,
-        path_limit_m: axis.path_limit_m,
+        path_nats: axis.path_nats,
+        path_limit_nats: axis.path_limit_nats,
         answer: axis.answer.as_ref().map(answer_view),
         identical_s: axis.identical_s,
     }
@@ -326,6 +337,18 @@ pub struct Verdict {
     confirmed: Vec<FaultCode>,
     /// The suspicion of each code when its test last failed in this session.
     suspected: [Option<Box<Suspicion>>; FaultCode::COUNT],
+    /// The kinds of the confirmed codes, each once, in the order of time.
+    named: Vec<NamedKind>,
+}
+
+/// A kind that a confirmed code was given.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct NamedKind {
+    code: FaultCode,
+    kind: FaultKind,
+    t_s: f64,
+    /// Its weight among the candidates.
+    weight: Option<f64>,
 }
 
 /// The state of a hasher as bytes.
@@ -372,11 +395,18 @@ impl Verdict {
     /// Records what the session has found. A transition of a test that passes again reports
     /// the state of a fault, not a new one.
     fn note(&mut self, transition: &Transition) {
-        let Transition { code, status, byte, suspicion, .. } = transition;
+        let Transition { at, code, status, byte, suspicion, .. } = transition;
         if byte.test_failed() {
             self.suspected[*code as usize] = Some(Box::new(suspicion.clone()));
             if *status == FaultStatus::Confirmed && !self.confirmed.contains(code) {
                 self.confirmed.push(*code);
+            }
+            if let (FaultStatus::Confirmed, Some(kind)) = (status, suspicion.kind)
+                && !self.named.iter().any(|named| (named.code, named.kind) == (*code, kind))
+            {
+                let candidates = suspicion.candidates.iter().map(|each| (each.kind, each.weight));
+                let weight = kind_weight(Some(kind), candidates);
+                self.named.push(NamedKind { code: *code, kind, t_s: at.seconds(), weight });
             }
         } else if *status == FaultStatus::Cleared {
             self.suspected[*code as usize] = None;

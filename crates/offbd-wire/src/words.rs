@@ -64,7 +64,7 @@ words! {
         Conflict = "conflict",
         /// It is too old to tell whether it is recorded.
         TooOld = "too_old",
-        /// It is no sample.
+        /// It is not a sample.
         Form = "form",
         /// Its session has ended.
         SessionEnded = "session_ended",
@@ -154,7 +154,7 @@ words! {
         NoReadings = "no_readings", NoCommands = "no_commands", NoAxis = "no_axis",
         Short = "short", Rate = "rate", Positions = "positions", Commands = "commands",
         CommandsHeld = "commands_held", OneAxis = "one_axis", Swapped = "swapped",
-        WrongSign = "wrong_sign",
+        WrongSign = "wrong_sign", Scale = "scale", NoRoom = "no_room",
     }
 }
 
@@ -172,6 +172,8 @@ impl From<&Misfit> for MisfitWord {
             Misfit::OneAxis { .. } => Self::OneAxis,
             Misfit::Swapped { .. } => Self::Swapped,
             Misfit::WrongSign { .. } => Self::WrongSign,
+            Misfit::Scale { .. } => Self::Scale,
+            Misfit::NoRoom { .. } => Self::NoRoom,
         }
     }
 }
@@ -252,7 +254,7 @@ words! {
     /// How the values of several sessions become one.
     SeriesAggregate as SeriesAggregate {
         Mean = "mean", Min = "min", Max = "max",
-        /// That of the latest session.
+        /// The value of the latest session.
         Last = "last",
     }
 }
@@ -358,11 +360,13 @@ words! {
 words! {
     /// Selects alarms.
     AlarmStateFilter as AlarmStateFilter {
-        /// The test fails now.
+        /// The test fails, and the fault is confirmed; or data of the rig have stopped.
         Failing = "failing",
+        /// The test fails; the fault is not confirmed yet.
+        Suspected = "suspected",
         /// On record as pending or confirmed; the test does not fail now.
         OnRecord = "on_record",
-        /// Failing or on record.
+        /// Failing, suspected or on record.
         Active = "active",
         /// Healed ones and those of lost communication that is back, too.
         All = "all",
@@ -395,6 +399,22 @@ words! {
 words! {
     /// How a channel sends.
     ChannelKind as ChannelKind { Webhook = "webhook", Email = "email" }
+}
+
+words! {
+    /// What a webhook posts.
+    #[derive(Default)]
+    WebhookFormat as WebhookFormat {
+        /// A CloudEvent in structured JSON, for programs.
+        #[default]
+        CloudEvents = "cloudevents",
+        /// An incoming webhook of Slack, which Mattermost and others take too: `{"text": …}`.
+        Slack = "slack",
+        /// An adaptive card, for a workflow of Microsoft Teams.
+        Teams = "teams",
+        /// Plain text.
+        Text = "text",
+    }
 }
 
 words! {

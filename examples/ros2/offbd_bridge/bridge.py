@@ -18,6 +18,9 @@ BATCH = 500
 # Faults that are known are shown for so long without a newer answer, s.
 FRESH_S = 5.0
 
+# Weight from which on a kind is stated as a fact; the program has the same limit.
+SURE = 0.8
+
 # Levels of diagnostic_msgs/DiagnosticStatus.
 OK, WARN, ERROR, STALE = 0, 1, 2, 3
 
@@ -36,6 +39,15 @@ class Diagnosis(NamedTuple):
     name: str
     message: str
     values: dict[str, str]
+
+
+def kind_words(fault: Mapping[str, Any]) -> str:
+    """Returns the kind of a fault, `dead` or `probably dead, 51 %`; empty if it is not known."""
+    kind: str = fault.get("kind") or ""
+    weights = [each["weight"] for each in fault.get("candidates", []) if each["kind"] == kind]
+    if not kind or not weights or weights[0] >= SURE:
+        return kind
+    return f"probably {kind}, {100 * weights[0]:.0f} %"
 
 
 class Bridge:
@@ -148,8 +160,9 @@ class Bridge:
         # Bit 0 of the status byte of ISO 14229: the test fails at present.
         fails = int(fault["status_byte"], 16) & 1 == 1
         level = ERROR if fails and fault["status"] == "confirmed" else WARN
-        words = ", ".join(word for word in (fault["status"], fault.get("kind")) if word)
-        message = words if fails else f"passes again; on record as {words}"
+        status = "suspected" if fault["status"] == "pending" else fault["status"]
+        words = ", ".join(word for word in (status, kind_words(fault)) if word)
+        message = words if fails else f"passing again; was {words}"
         keys = ("status", "status_byte", "kind", "occurrences", "trips")
         values = {key: str(fault[key]) for key in keys if fault.get(key)}
         return self._diagnosis(level, code, message, values)

@@ -42,12 +42,12 @@ use show::Show;
     offbd demo --seconds 60\n  \
     offbd demo --seconds 90 --fault y_servo:gain=0.3@20 --fault sensor:freeze@60\n  \
     offbd demo --seconds 120 --speed 10 --port 0\n\n\
-    With --seconds, a script injects and repairs faults from the beginning, and\n\
+    With --seconds, a script breaks and repairs the rig from the beginning, and\n\
     clears a code before it injects its fault again. Without, the rig stays healthy\n\
     for a minute, so that you can inject faults yourself on the page Lessons; then\n\
-    the script injects and repairs faults, and what was found stays on record until\n\
-    you clear it, or heals after enough sessions without it. On that page you can\n\
-    tune the controller as well.\n\n\
+    the script breaks and repairs it, and what was found stays on record until you\n\
+    clear it, or heals after enough sessions without it. On that page you can tune\n\
+    the controller as well.\n\n\
     A fault is CODE:KIND[=SIZE]@START[-END]; `offbd simulate --help` lists them.\n\n\
     Exit status with --seconds: 0 if what was injected and what was found agree,\n\
     else 1.")]

@@ -40,7 +40,7 @@ pub(super) struct Show {
     controls: VisitorControls,
     /// Whether the script injects and repairs faults.
     script: bool,
-    /// Whether the script clears codes, so that it can show each fault anew.
+    /// Whether the script clears codes, so that it can show each fault again.
     clears: bool,
     /// Prefix of the names of this show's sessions.
     name: String,

@@ -26,7 +26,12 @@ use offbd_terminal::errors::{self, InputError};
 #[derive(Clone, Debug, Args)]
 pub(super) struct ConnectArgs {
     /// Address of the service; with `https://` the connection is encrypted
-    #[arg(long, default_value = "127.0.0.1:8087", value_name = "[https://]HOST[:PORT]")]
+    #[arg(
+        long = "url",
+        visible_alias = "address",
+        default_value = "127.0.0.1:8087",
+        value_name = "[https://]HOST[:PORT]"
+    )]
     address: String,
     /// File with a token, if the service requires one. Without TLS it is sent to this
     /// machine only
@@ -53,7 +58,7 @@ pub(super) async fn connect(args: &ConnectArgs, asset: &str, hz: f64) -> anyhow:
     let service = ServiceAddress::parse(&args.address)?;
     let request = request(args, &service, asset, hz)?;
     let ServiceAddress { host, port, is_encrypted } = &service;
-    let missing = || format!("no stream of {asset} at {}", args.address);
+    let missing = || format!("cannot stream {asset} from {}", args.address);
     let socket = TcpStream::connect((host.as_str(), *port)).await;
     let socket = socket.map_err(|error| no_service(&args.address, &error))?;
     let transport: Box<dyn Transport> = if *is_encrypted {
@@ -70,11 +75,11 @@ pub(super) async fn connect(args: &ConnectArgs, asset: &str, hz: f64) -> anyhow:
     }
 }
 
-/// The error if no service answers: what to do.
+/// The error if no service answers; it says what to do.
 fn no_service(address: &str, error: &std::io::Error) -> anyhow::Error {
     anyhow!(
         "no service answers at {address} ({error}); start one with `offbd serve` or `offbd demo`, \
-         or give its address with `--address HOST:PORT`"
+         or give its address with `--url HOST:PORT`"
     )
 }
 
@@ -107,7 +112,7 @@ impl ServiceAddress {
     fn parse(address: &str) -> anyhow::Result<Self> {
         let full =
             if address.contains("://") { address.to_owned() } else { format!("http://{address}") };
-        let invalid = || format!("`--address`: {address} is not [https://]HOST[:PORT]");
+        let invalid = || format!("`--url`: {address} is not [https://]HOST[:PORT]");
         let uri: Uri = full.parse().with_context(invalid)?;
         let is_encrypted = match uri.scheme_str() {
             Some("https" | "wss") => true,
@@ -145,7 +150,7 @@ fn request(
     let mut request = url.into_client_request()?;
     if let Some(file) = &args.token_file {
         if !service.is_private() {
-            let reason = "the token would be sent unencrypted; use `--address https://…`";
+            let reason = "the token would be sent unencrypted; use `--url https://…`";
             return Err(InputError::new("`--token-file`", reason).into());
         }
         let token = String::from_utf8(errors::read(file)?);

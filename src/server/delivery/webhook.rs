@@ -1,5 +1,5 @@
-//! Posts messages to a URL: a CloudEvent in structured JSON, signed as Standard Webhooks say
-//! (symmetric signature, version 1). Redirects are not followed.
+//! Posts messages to a URL in the format of the channel, signed as Standard Webhooks say (symmetric
+//! signature, version 1). Redirects are not followed.
 
 use std::error::Error;
 use std::future::Future;
@@ -26,6 +26,7 @@ use tower_service::Service;
 use super::{addresses, failed};
 use offbd_service::{SendOutcome, TargetPolicy, webhook_key};
 use offbd_wire::notification::NotificationView;
+use offbd_wire::words::WebhookFormat;
 
 type WebhookClient = Client<HttpsConnector<HttpConnector<PermittedHosts>>, Body>;
 
@@ -77,10 +78,12 @@ impl WebhookSender {
     pub(super) async fn send(
         &self,
         (url, secret): (&str, &str),
+        format: WebhookFormat,
         message: &NotificationView,
         now: i64,
     ) -> SendOutcome {
-        let request = match self.request(url, secret, message, now / 1_000_000) {
+        let posted = message.posted(format);
+        let request = match self.request((url, secret), &message.id, posted, now / 1_000_000) {
             Ok(request) => request,
             Err(reason) => return failed(reason),
         };
@@ -92,9 +95,9 @@ impl WebhookSender {
 
     fn request(
         &self,
-        url: &str,
-        secret: &str,
-        message: &NotificationView,
+        (url, secret): (&str, &str),
+        id: &str,
+        (media_type, body): (&str, String),
         now_s: i64,
     ) -> Result<Request<Body>, String> {
         let uri: hyper::Uri = url.parse().map_err(|_| "the URL is not valid".to_owned())?;
@@ -102,11 +105,10 @@ impl WebhookSender {
         let checked = self.targets.check_host(uri.host().unwrap_or_default());
         checked.map_err(|reason| format!("the host {reason}"))?;
         let key = webhook_key(secret).ok_or("the secret is not valid")?;
-        let body = serde_json::to_string(message).map_err(|error| error.to_string())?;
-        let (id, timestamp) = (message.id.as_str(), now_s.to_string());
+        let timestamp = now_s.to_string();
         let signature = signature(&key, &format!("{id}.{timestamp}.{body}"));
         Request::post(uri)
-            .header(CONTENT_TYPE, "application/cloudevents+json")
+            .header(CONTENT_TYPE, media_type)
             .header(USER_AGENT, concat!("offbd/", env!("CARGO_PKG_VERSION")))
             .header("webhook-id", id)
             .header("webhook-timestamp", timestamp)

@@ -1,4 +1,4 @@
-//! Devices with topics and formats of their own, by a mapping file.
+//! Devices with their own topics and formats, by a mapping file.
 
 use crate::bus::{connected, count, metric};
 use crate::support::broker::Mosquitto;

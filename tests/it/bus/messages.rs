@@ -82,7 +82,7 @@ async fn live(device: &mut BusDevice, observer: &mut Observer) {
     observer.until("communication").await;
 }
 
-/// Sends a batch that is refused. It is no message that the document describes, its answer is.
+/// Sends a batch that is refused. It is not a message that the document describes, its answer is.
 async fn be_refused(device: &mut BusDevice, described: &mut Described, channel: &str) {
     let answer = device.ask(br#"{"id":"broken","samples":1}"#.to_vec()).await;
     assert_eq!(described.note(channel, &answer), "batchRefusal");

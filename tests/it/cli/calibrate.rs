@@ -8,6 +8,9 @@ fn a_calibration_is_near_the_true_parameters() {
     cli.ok("simulate --rig rig.json --reference lissajous --seconds 90 --seed 7 -o healthy.csv");
     let done = cli.ok("calibrate --asset rig.json healthy.csv -o learnt.json");
     assert!(done.stderr.contains("gain") && done.stdout.is_empty());
+    let table = done.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(table.contains("from 63 simulated rigs"), "{table}");
+    assert!(table.contains("they are not measured on this rig"), "{table}");
     let asset: Value = serde_json::from_str(&cli.read("learnt.json")).unwrap();
     let learnt = &asset["calibration"];
     // Parameters of the preset: gain 1 and 0.96, level 8 mrad and −5 mrad; play and drag make
@@ -83,11 +86,41 @@ fn implausible_units_are_rejected_with_a_suggestion() {
         ([1e3, 1.0, 1.0, 1.0, 1.0], "is t_s in ms?"),
         ([1.0, 57.3, 57.3, 1.0, 1.0], "is axes.command_unit_rad 0.0175?"),
         ([1.0, 1.0, 1.0, 1e3, 1e3], "is axes.position_unit_m 0.001?"),
+        ([1.0, 1.0, 1.0, 0.1, 0.1], "(axes.position_unit_m 10 instead of 1)?"),
     ] {
         write_scaled(&cli, "other.csv", factors);
         let refused = cli.run(3, "calibrate --asset rig.json other.csv -o out.json");
         assert!(refused.stderr.contains(words), "{}", refused.stderr);
     }
+    assert!(!cli.path("out.json").exists());
+}
+
+/// Readings a tenth of what they should be move and scatter a tenth as much: that is a unit, and not
+/// a fault of both servos.
+#[test]
+fn a_wrong_unit_on_a_learnt_rig_is_not_a_dead_servo() {
+    let cli = CliFixture::new();
+    cli.ok("simulate --rig rig.json --reference lissajous --seconds 60 --seed 7 -o first.csv");
+    cli.ok("calibrate --asset rig.json first.csv -o learnt.json");
+    write_scaled(&cli, "small.csv", [1.0, 1.0, 1.0, 0.1, 0.1]);
+    let text = cli.ok("replay --asset learnt.json small.csv").stdout;
+    assert!(text.contains("cannot tell a wrong unit from x_servo"), "{text}");
+    let json = cli.ok("replay --asset learnt.json --format json small.csv").stdout;
+    let summary: Value = serde_json::from_str(json.lines().last().unwrap()).unwrap();
+    assert_eq!(summary["outcome"], "cannot tell", "{summary}");
+    let warning = &summary["warnings"][0];
+    assert_eq!(warning["code"], "scale", "{summary}");
+    let words = "and the readings scatter as much less: are the positions 10 times as large";
+    assert!(warning["message"].as_str().unwrap().contains(words), "{warning}");
+}
+
+/// A ball that mostly rests shows nothing of the servos.
+#[test]
+fn a_calibration_that_would_find_nothing_is_refused() {
+    let cli = CliFixture::new();
+    cli.ok("simulate --rig-seed 3 --seed 1 --reference steps --seconds 90 --rig rig.json -o r.csv");
+    let refused = cli.run(3, "calibrate --asset rig.json r.csv -o out.json");
+    assert!(refused.stderr.contains("the calibration would be blind"), "{}", refused.stderr);
     assert!(!cli.path("out.json").exists());
 }
 

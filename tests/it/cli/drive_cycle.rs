@@ -33,7 +33,7 @@ fn a_missing_drive_cycle_is_explained() {
     let cli = CliFixture::new();
     cli.calibrated();
     let refused = cli.run(3, "drive-cycle --asset rig.json").stderr;
-    assert!(refused.contains("rig.json: /calibration: the rig is not learnt"), "{refused}");
+    assert!(refused.contains("rig.json: /calibration: the rig is not calibrated"), "{refused}");
     let mut tiny: Value = serde_json::from_str(&cli.read("learnt.json")).unwrap();
     tiny["plate"]["width_m"] = 0.03.into();
     cli.write("tiny.json", &tiny.to_string());

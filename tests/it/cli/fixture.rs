@@ -54,6 +54,14 @@ impl CliFixture {
         done
     }
 
+    /// Runs `offbd` with this environment and expects success; returns stdout.
+    pub fn with(&self, environment: &[(&str, &str)], line: &str) -> String {
+        let mut command = Command::cargo_bin("offbd").unwrap();
+        command.args(line.split_whitespace()).current_dir(self.dir.path());
+        let done = command.envs(environment.iter().copied()).assert().success();
+        String::from_utf8(done.get_output().stdout.clone()).unwrap()
+    }
+
     /// Runs `offbd` and expects success.
     pub fn ok(&self, line: &str) -> CommandOutput {
         self.run(0, line)

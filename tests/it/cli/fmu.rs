@@ -56,7 +56,7 @@ fn without_a_usable_library_there_is_no_fmu() {
     assert!(missing.contains("none.so: "), "{missing}");
     cli.write("script.so", "#!/bin/sh\n");
     let other = cli.run(3, "export fmu --library script.so -o twin.fmu").stderr;
-    assert!(other.contains("script.so: is no shared library"), "{other}");
+    assert!(other.contains("script.so: is not a shared library"), "{other}");
     assert!(!cli.path("twin.fmu").exists());
     cli.run(2, "export fmu");
 }

@@ -6,6 +6,7 @@ mod demo;
 mod drive_cycle;
 pub mod fixture;
 mod fmu;
+mod readme;
 mod replay;
 mod scene;
 mod score;

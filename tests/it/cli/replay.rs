@@ -223,6 +223,20 @@ fn unwrapped(text: &str) -> String {
 }
 
 #[test]
+fn verdicts_have_colours_only_where_they_are_wanted() {
+    let cli = CliFixture::new();
+    cli.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
+    let line = "replay --asset learnt.json sick.csv healthy.csv";
+    let coloured = cli.with(&[("CLICOLOR_FORCE", "1")], line);
+    for words in ["\u{1b}[31mx_servo (", "\u{1b}[32mno fault\u{1b}[0m"] {
+        assert!(coloured.contains(words), "{coloured}");
+    }
+    assert!(!cli.with(&[], line).contains('\u{1b}'), "a pipe");
+    let refused = [("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")];
+    assert!(!cli.with(&refused, line).contains('\u{1b}'), "NO_COLOR");
+}
+
+#[test]
 fn unjudged_monitors_are_reported() {
     let cli = CliFixture::new();
     cli.calibrated().ok("simulate --seconds 0.3 -o short.csv");
@@ -231,8 +245,10 @@ fn unjudged_monitors_are_reported() {
     assert!(unwrapped(&short).contains(" 0.3 not judged judged x_servo "), "{short}");
     assert!(!short.contains("no fault"), "{short}");
     let unlearnt = cli.ok("replay healthy.csv").stdout;
-    let words = "no fault of sensor; not learnt: x_servo, y_servo, stuck_ball";
+    let words = "no fault of sensor; not calibrated: x_servo, y_servo, stuck_ball";
     assert!(unwrapped(&unlearnt).contains(words), "{unlearnt}");
+    let book = cli.ok("replay --asset learnt.json --profile textbook healthy.csv").stdout;
+    assert!(unwrapped(&book).contains("; no test in this profile: stuck_ball, sensor"), "{book}");
     let lines = cli.ok("replay --asset learnt.json --format json healthy.csv short.csv").json();
     let summaries: Vec<&Value> = lines.iter().filter(|l| l["type"] == "summary").collect();
     assert_eq!([&summaries[0]["outcome"], &summaries[1]["outcome"]], ["no fault", "not judged"]);

@@ -213,7 +213,7 @@ fn a_failed_run_reports_the_time_and_keeps_its_results() {
     let cli = CliFixture::new();
     let euler = "--model compliant --method euler --step 0.001";
     let done = cli.run(1, &format!("scene steep {euler} -o out --sample 0.001"));
-    assert!(done.stderr.contains("no number any more"), "{}", done.stderr);
+    assert!(done.stderr.contains("the state is not a number"), "{}", done.stderr);
     assert!(done.stdout.contains("failed"), "{}", done.stdout);
     let rows = rows(&cli, "out/trajectory.csv");
     assert!(!rows.is_empty() && rows.iter().flatten().all(|value| value.is_finite()));
@@ -224,7 +224,7 @@ fn a_failed_run_reports_the_time_and_keeps_its_results() {
 fn an_unreachable_tolerance_is_explained() {
     let cli = CliFixture::new();
     let one_pass = cli.run(1, "scene steep --tolerance 1e-12").stderr;
-    assert!(one_pass.contains("no model keeps 1e-12 m here: "), "{one_pass}");
+    assert!(one_pass.contains("no model stays within 1e-12 m here: "), "{one_pass}");
     let done = cli.run(1, "scene steep --tolerance 1e-12 --search");
     assert!(done.stderr.contains("no model and method meets 1e-12 m"), "{}", done.stderr);
     assert!(done.stderr.contains("rodas4"), "{}", done.stderr);

@@ -64,8 +64,8 @@ fn migrating_twice_changes_nothing() {
 
 #[test]
 fn watch_reports_a_missing_service() {
-    let done = CliFixture::new().run(1, "watch bench-1 --address 127.0.0.1:1");
-    for expected in ["no service answers at 127.0.0.1:1", "offbd serve", "--address"] {
+    let done = CliFixture::new().run(1, "watch bench-1 --url 127.0.0.1:1");
+    for expected in ["no service answers at 127.0.0.1:1", "offbd serve", "--url"] {
         assert!(done.stderr.contains(expected), "{}", done.stderr);
     }
     assert_eq!(done.stderr.matches("refused").count(), 1, "{}", done.stderr);

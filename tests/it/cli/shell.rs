@@ -101,7 +101,7 @@ fn results_are_printed_as_json_on_request() {
     );
     let unasked = cli.ok("check --format json").json().remove(0);
     assert!(unasked["checked"].is_null(), "{unasked}");
-    let copied = cli.ok("backup --data store copy.sqlite --format json").json().remove(0);
+    let copied = cli.ok("backup --data store -o copy.sqlite --format json").json().remove(0);
     assert_eq!(copied["file"], "copy.sqlite");
     let restored = cli.ok("restore --data other copy.sqlite --format json").json().remove(0);
     assert!(restored["store"].as_str().unwrap().contains("other"), "{restored}");

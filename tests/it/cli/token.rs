@@ -24,7 +24,7 @@ fn a_token_can_be_created_listed_and_revoked() {
     assert!(again.stderr.contains("a token `rig` exists already"), "{}", again.stderr);
     cli.ok("token revoke ann --data store");
     let gone = cli.run(1, "token revoke ann --data store");
-    assert!(gone.stderr.contains("no token `ann` is in force"), "{}", gone.stderr);
+    assert!(gone.stderr.contains("no valid token `ann`"), "{}", gone.stderr);
     let tokens = cli.ok("token list --format json --data store").json();
     let names: Vec<_> = tokens.iter().map(|token| token["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["rig", "ann"]);

@@ -3,7 +3,7 @@ use std::process::{Command, Stdio};
 
 use super::fixture::CliFixture;
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 14] = [
     "simulate",
     "calibrate",
     "replay",
@@ -14,6 +14,8 @@ const COMMANDS: [&str; 12] = [
     "demo",
     "serve",
     "watch",
+    "forward",
+    "backup",
     "migrate",
     "check",
 ];
@@ -27,6 +29,8 @@ fn the_help_of_each_command_has_an_example_and_fits_in_eighty_columns() {
         let wide = help.stdout.lines().find(|line| line.chars().count() > 80);
         assert_eq!(wide, None);
         assert_eq!(help.stderr, "");
+        // Of clap, where the other commands are described as "Prints …".
+        assert!(!help.stdout.contains("Print this message"), "{command}");
     }
     assert!(cli.ok("--help").stdout.contains("Exit status"));
 }

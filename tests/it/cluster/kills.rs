@@ -61,7 +61,7 @@ impl Probes {
     }
 }
 
-/// A batch whose acknowledgement is waited for.
+/// A batch whose acknowledgement the test waits for.
 struct ProbeQuestion {
     client: Client,
     part: Vec<Sample>,

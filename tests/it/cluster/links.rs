@@ -44,7 +44,7 @@ fn faults(long: &[(LinkMode, LinkMode)]) -> Vec<(LinkMode, LinkMode)> {
     LINK_FAULTS.into_iter().filter(|fault| all || !long.contains(fault)).collect()
 }
 
-/// Two nodes, of which each has links of its own.
+/// Two nodes, of which each has its own links.
 struct LinkedCluster {
     cluster: Cluster,
     to_database: Vec<(Link, tempfile::TempDir)>,
@@ -145,7 +145,7 @@ async fn an_idle_node_whose_answers_of_the_database_are_lost_takes_part_again() 
 async fn a_node_whose_link_to_the_database_fails_loses_nothing_and_takes_part_again() {
     let it = LinkedCluster::start().await;
     let clients = it.clients().await;
-    // A commit whose answer is lost is waited for 30 s.
+    // A node waits 30 s for a commit whose answer is lost.
     let long = [(LinkMode::Pass, LinkMode::Drop), (LinkMode::Drop, LinkMode::Drop)];
     for (up, down) in faults(&long) {
         let node = it.greatest().await;

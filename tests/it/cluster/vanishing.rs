@@ -1,4 +1,4 @@
-//! Packets between nodes vanish without a word while each node reaches the database: what a node
+//! Packets between nodes vanish silently while each node reaches the database: what a node
 //! cannot answer without the other one it refuses in time, and everything goes on when packets
 //! pass again.
 

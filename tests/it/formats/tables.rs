@@ -11,8 +11,15 @@ const CSV_FILE: &[u8] =
     b"seq,t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0.1,,0.25,-0.5\n1,0.01,-0.1,0.2,,\n";
 
 fn rows(file: &[u8]) -> Result<Vec<Result<Sample, String>>, SessionFileError> {
+    rows_by(file, &TableOptions::default())
+}
+
+fn rows_by(
+    file: &[u8],
+    options: &TableOptions,
+) -> Result<Vec<Result<Sample, String>>, SessionFileError> {
     let mut samples = Vec::new();
-    for row in open(Cursor::new(file.to_vec()), None, &TableOptions::default())? {
+    for row in open(Cursor::new(file.to_vec()), None, options)? {
         match row {
             Ok(sample) => samples.push(Ok(sample)),
             Err(SessionRowError::Rejected(row)) => samples.push(Err(row.to_string())),
@@ -51,7 +58,8 @@ mod columns {
     use arrow_array::cast::AsArray;
     use arrow_array::types::{Float32Type, Int32Type, TimestampMicrosecondType, UInt8Type};
     use arrow_array::{
-        ArrayRef, BooleanArray, Float64Array, NullArray, PrimitiveArray, RecordBatch,
+        ArrayRef, BooleanArray, Decimal128Array, Float64Array, NullArray, PrimitiveArray,
+        RecordBatch, StringArray, TimestampMicrosecondArray,
     };
     use offbd::wire::session_file::{SessionInfo, SessionWriter};
     use proptest::prelude::*;
@@ -189,7 +197,7 @@ mod columns {
         assert_eq!(found[1].as_ref().unwrap_err(), "row 2: `x_m`: `inf` is not finite");
         assert_eq!(found[2].as_ref().unwrap().x_m, Some(1.0));
         let found = rows(&with("t_s", doubles([0.0, f64::NAN, 2.0]))).unwrap();
-        assert_eq!(found[1].as_ref().unwrap_err(), "row 2: `t_s` is missing");
+        assert_eq!(found[1].as_ref().unwrap_err(), "row 2: `t_s` is empty");
         let found = rows(&with("seq", doubles([0.5, -1.0, 1e300]))).unwrap();
         assert!(found.iter().all(|row| row.as_ref().unwrap_err().contains("`seq`")), "{found:?}");
     }
@@ -200,11 +208,47 @@ mod columns {
         let error = rows(&with("cmd_qy_rad", truth)).unwrap_err().to_string();
         assert_eq!(error, "the column `cmd_qy_rad` has the type Boolean, not a number");
         let error = rows(&stream(vec![("t_s", doubles([0.0; 3]))])).unwrap_err().to_string();
-        assert!(error.contains("no column `cmd_qx_rad`"), "{error}");
+        assert!(error.contains("lacks the column `cmd_qx_rad`; it has `t_s`"), "{error}");
         let columns = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m", "x_m"];
         let twice = columns.map(|name| (name, doubles([0.0; 3]))).to_vec();
         let error = rows(&stream(twice)).unwrap_err().to_string();
-        assert!(error.contains("two columns `x_m`"), "{error}");
+        assert!(error.contains("names the column `x_m` twice"), "{error}");
+    }
+
+    #[test]
+    fn dates_text_and_decimals_are_read_as_from_a_text() {
+        let times: ArrayRef = Arc::new(
+            TimestampMicrosecondArray::from(vec![1_771_595_460_250_000, 1_771_595_461_000_000])
+                .with_timezone("UTC"),
+        );
+        let x: ArrayRef = Arc::new(StringArray::from(vec!["12,5", "12.5"]));
+        let decimals = Decimal128Array::from(vec![-125, 250]).with_precision_and_scale(9, 4);
+        let y: ArrayRef = Arc::new(decimals.unwrap());
+        let command: ArrayRef = Arc::new(Float64Array::from(vec![0.1, 0.2]));
+        let columns = vec![("when", times), ("q", command), ("ball x", x), ("ball y", y)];
+        let options = TableOptions {
+            columns: "t_s=when, cmd_qy_rad=q, cmd_qx_rad=q, x_m='ball x'/mm, y_m='ball y'"
+                .parse()
+                .unwrap(),
+            ..TableOptions::default()
+        };
+        let found = rows_by(&stream(columns), &options).unwrap();
+        assert_eq!(found[0].as_ref().unwrap_err(), "row 1: `x_m`: `12,5` is not a number");
+        let second = found[1].as_ref().unwrap();
+        assert_eq!(
+            (second.t_s, second.x_m, second.y_m),
+            (1_771_595_461.0, Some(0.0125), Some(0.025))
+        );
+    }
+
+    #[test]
+    fn columns_of_other_names_are_answered_with_a_mapping() {
+        let names = ["time", "roll_deg", "pitch_deg", "bx", "by"];
+        let columns = names.map(|name| (name, doubles([0.0, 10.0, 20.0]))).to_vec();
+        let error = rows(&stream(columns)).unwrap_err().to_string();
+        for part in ["it has `time`, `roll_deg`", "t_s=time/ms, cmd_qx_rad=roll_deg/deg"] {
+            assert!(error.contains(part), "{error}");
+        }
     }
 
     /// Samples of which a file has several pages and batches.
@@ -269,9 +313,12 @@ mod columns {
             ),
             at_a_time in 1..20_usize,
         ) {
-            let expected: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
-                seq, t_s, cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
+            // Large times are those of another unit, and a time that falls is that of another run.
+            let in_seconds = |t_s: f64| if t_s.abs() < 1e11 { t_s } else { t_s.recip() };
+            let mut expected: Vec<Sample> = rows.into_iter().map(|(seq, t_s, [a, b, c, d])| Sample {
+                seq, t_s: in_seconds(t_s), cmd_qx_rad: a, cmd_qy_rad: b, x_m: c, y_m: d,
             }).collect();
+            expected.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
             for &format in FORMATS {
                 let back = samples(&write(format, &expected, at_a_time));
                 prop_assert_eq!(format!("{:?}", back), format!("{:?}", expected));
@@ -328,11 +375,31 @@ mod mcap_files {
     }
 
     #[test]
-    fn a_file_without_samples_says_which_schema_it_lacks() {
-        for other in [file("other", "json", &["{}"]), file("offbd.Sample", "cdr", &["{}"])] {
-            let error = rows(&other).unwrap_err().to_string();
-            assert!(error.contains("`offbd.Sample`"), "{error}");
+    fn a_file_without_samples_says_which_schema_and_which_columns_it_lacks() {
+        let error = rows(&file("offbd.Sample", "cdr", &["{}"])).unwrap_err().to_string();
+        assert!(error.contains("`offbd.Sample`, and no other topic in JSON"), "{error}");
+        let other = file("other", "json", &[r#"{"stamp": 1, "ball": {"x": 0}}"#]);
+        let error = rows(&other).unwrap_err().to_string();
+        let found = "lacks the column `t_s`; it has `stamp`, `ball.x`, `log_time`.";
+        assert!(error.contains(found) && error.contains("t_s=stamp/s"), "{error}");
+    }
+
+    #[test]
+    fn of_several_topics_in_json_none_is_chosen() {
+        let mut writer = WriteOptions::new().create(Cursor::new(Vec::new())).unwrap();
+        for topic in ["/ball", "/plate"] {
+            let channel_id = writer.add_channel(0, topic, "json", &BTreeMap::new()).unwrap();
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, b"{}").unwrap();
         }
+        writer.finish().unwrap();
+        let error = rows(&writer.into_inner().into_inner()).unwrap_err().to_string();
+        assert!(
+            error.contains(
+                "several other topics in JSON, `/ball`, `/plate`; a recording is read from one"
+            ),
+            "{error}"
+        );
     }
 
     /// The messages of a session that is written with an asset file, by topic.

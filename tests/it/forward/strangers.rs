@@ -1,4 +1,4 @@
-//! Clients that are no devices: pages of other sites, and those that never end a request.
+//! Clients that are not devices: pages of other sites, and those that never end a request.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

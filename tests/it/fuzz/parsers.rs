@@ -100,7 +100,7 @@ fn batch(read: Result<Batch, BatchError>) -> String {
     format!("taken {named:?} {} {first}", samples.len().min(3))
 }
 
-/// A payload of a device with a format of its own.
+/// A payload of a device with its own format.
 fn mapped(input: &[u8]) -> String {
     let topic = serde_json::json!({
         "pattern": "a", "asset": "a", "samples": "/s", "session": "/n", "seq": "/q",

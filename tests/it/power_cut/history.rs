@@ -32,7 +32,7 @@ const JOURNAL_BYTES: [&str; 3] = ["20000", "1", "16777216"];
 /// Syncs of a life, one of which fails.
 const SYNCS: usize = 60;
 
-/// Most samples of a batch, except one for chunks of its own.
+/// Most samples of a batch, except one that has its own chunks.
 const BATCH: usize = 80;
 
 /// What was acknowledged before a power cut.
@@ -80,6 +80,15 @@ impl History {
     /// Lets a service live `n_earlier` times, and starts it again while the sync with this
     /// number fails; if it starts nevertheless, a rig is registered.
     pub async fn of_failed_start(library: &Path, n_earlier: u64, number: u64) -> Self {
+        loop {
+            if let Some(history) = Self::try_of_failed_start(library, n_earlier, number).await {
+                return history;
+            }
+        }
+    }
+
+    /// Returns `None` if the service ended while one of its threads wrote a record.
+    async fn try_of_failed_start(library: &Path, n_earlier: u64, number: u64) -> Option<Self> {
         let (folder, scratch) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let file = scratch.path().join("record");
         let control = CallControl::new(library, folder.path(), &scratch.path().join("control"));
@@ -95,7 +104,7 @@ impl History {
             request(&process.client, Method::POST, "assets", &body, &id).await;
             stop(process).await;
         }
-        Self { records: read_records(&file).unwrap(), folder }
+        Some(Self { records: read_records(&file)?, folder })
     }
 
     /// The disk after the first `n` records.

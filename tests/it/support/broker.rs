@@ -63,7 +63,7 @@ fn find(name: &str, places: &[PathBuf], missing: &str) -> PathBuf {
     known.unwrap_or_else(|| panic!("{missing}"))
 }
 
-/// A nats-server with the configuration that is shipped, on ports of its own.
+/// A nats-server with the configuration that is shipped, on its own ports.
 pub struct Nats {
     directory: tempfile::TempDir,
     pub port: u16,

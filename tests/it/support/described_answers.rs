@@ -61,7 +61,7 @@ pub fn operations(document: &Value) -> impl Iterator<Item = (&String, &String, &
     })
 }
 
-/// Schemas with names of their own, to be compiled together with those of the description.
+/// Schemas with their own names, to be compiled together with those of the description.
 pub struct SchemaTable {
     definitions: Map<String, Value>,
     n: usize,

@@ -13,6 +13,7 @@ pub mod deletions;
 pub mod described;
 pub mod described_answers;
 pub mod device;
+pub mod fenced;
 pub mod held_socket;
 pub mod history;
 pub mod liar;
@@ -537,8 +538,8 @@ impl Events {
     }
 }
 
-/// Pause between two looks at what is to come. It leaves the processors to the service that is
-/// waited for, and is short beside what a test does.
+/// Pause between two looks at what is to come. It leaves the processors to the service under test,
+/// and is short beside what a test does.
 const POLL_PAUSE: Duration = Duration::from_millis(2);
 
 /// Repeats `done` until it returns something; fails after [`DEADLINE`].

@@ -26,7 +26,7 @@ else
 fi
 "#;
 
-/// The port in the name of the server's socket, unless it listens on one of its own.
+/// The port in the name of the server's socket, unless it listens on its own port.
 const PORT: u16 = 5432;
 
 pub struct Postgres {

@@ -46,7 +46,7 @@ pub fn frame(text: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// Reads the next frame of the service that is no ping: its kind and its content.
+/// Reads the next frame of the service that is not a ping: its kind and its content.
 pub async fn read_frame(socket: &mut TcpStream) -> (u8, Vec<u8>) {
     loop {
         let [kind, length] = socket.read_u16().await.unwrap().to_be_bytes();

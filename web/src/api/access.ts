@@ -6,7 +6,7 @@ export function withCredentials(init: RequestInit): RequestInit {
   return { ...init, credentials: "same-origin" };
 }
 
-/** Returns the URL of a stream; a stream cannot send headers of its own. */
+/** Returns the URL of a stream; a stream cannot send its own headers. */
 export function streamUrl(path: string): string {
   return path;
 }

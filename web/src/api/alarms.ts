@@ -13,6 +13,7 @@ export type Channel = Schemas["Channel"];
 export type Delivery = Schemas["Delivery"];
 export type DeliveryState = Schemas["DeliveryState"];
 export type Mute = Schemas["Mute"];
+export type Note = Schemas["Note"];
 export type NewChannel = Schemas["NewChannel"];
 export type NewRule = Schemas["NewRule"];
 export type Rule = Schemas["Rule"];
@@ -37,12 +38,13 @@ export const alarmApi = {
   acknowledge: (alarms: { asset: string; code: AlarmCode }[]) =>
     send<Schemas["Acknowledged"]>("POST", `/alarms/acknowledge${by()}`, { alarms }),
   advice: () => get<Advice>("/advice"),
-  putNote: (code: AlarmCode, text: string) => send("PUT", `/advice/${segment(code)}/note${by()}`, { text }),
+  putNote: (code: AlarmCode, text: string, before?: Note) =>
+    send("PUT", `/advice/${segment(code)}/note${by()}`, { text }, before?.etag ?? null),
   mutes: async (asset: string) => (await get<Page<Mute>>(`/assets/${segment(asset)}/mutes`)).items,
   mute: (asset: string, code: AlarmCode, reason: string, until: string) =>
-    send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }),
-  unmute: (asset: string, code: AlarmCode) =>
-    send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`),
+    send<Mute>("PUT", `/assets/${segment(asset)}/mutes/${segment(code)}${by()}`, { reason, until }, null),
+  unmute: ({ asset, code, etag }: Mute) =>
+    send("DELETE", `/assets/${segment(asset)}/mutes/${segment(code)}`, undefined, etag),
   channels: async () => (await get<Page<Channel>>(CHANNELS)).items,
   createChannel: (channel: NewChannel) => send<Schemas["MadeChannel"]>("POST", CHANNELS, channel),
   putChannel: ({ id, etag }: Channel, channel: NewChannel) =>

@@ -66,14 +66,18 @@ export async function request<T>(path: string, init: RequestInit = {}): Promise<
 
 export const get = <T>(path: string) => request<T>(BASE + path);
 
-/** Sends a change; with `edition`, the service refuses it if another edition is there by now. */
-export const send = <T>(method: string, path: string, body?: unknown, edition?: string) =>
+/**
+ * Sends a change; with `edition`, the service refuses it if another edition is there by now, with
+ * null if there is any.
+ */
+export const send = <T>(method: string, path: string, body?: unknown, edition?: string | null) =>
   request<T>(BASE + path, {
     method,
     ...(body === undefined ? {} : { body: JSON.stringify(body) }),
     headers: {
       ...(body === undefined ? {} : { "content-type": "application/json" }),
       ...(edition ? { "if-match": edition } : {}),
+      ...(edition === null ? { "if-none-match": "*" } : {}),
     },
   });
 

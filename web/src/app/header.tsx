@@ -1,6 +1,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { fleetEvents, type ConnectionState } from "../api/events";
 import { useOpenAlarms } from "../hooks/use-open-alarms";
+import { useTitleNumber } from "../hooks/use-title";
 import { LoggedIn } from "../parts/login/logged-in";
 import { useRefusal } from "../parts/login/rights";
 import { Link } from "../router/link";
@@ -46,6 +47,7 @@ export function Header({ segments }: { segments: string[] }) {
   useEffect(() => fleetEvents.listen(() => {}), []);
   const isAdmin = useRefusal("admin") === undefined;
   const openAlarms = useOpenAlarms();
+  useTitleNumber(openAlarms);
   const [first] = segments;
   const nav = useRef<HTMLElement>(null);
   useEffect(() => showCurrent(nav.current!), [first]);

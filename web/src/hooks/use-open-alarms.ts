@@ -5,7 +5,7 @@ import { useQuery } from "./use-query";
 /** Polling interval, ms; events report changes earlier. */
 const INTERVAL_MS = 5000;
 
-/** The number of alarms that fail and are unacknowledged, as text; undefined if there is none. */
+/** The number of confirmed alarms that fail and are unacknowledged, as text; undefined if there is none. */
 export function useOpenAlarms(): string | undefined {
   const fetch = () => alarmApi.alarms({ state: "failing", acknowledged: false });
   const { data, refetch } = useQuery(fetch, "open alarms", INTERVAL_MS);

@@ -46,7 +46,7 @@ export class TraceBuffer {
 
   /**
    * Appends the first moments that came over a new connection, which may be there already. If others between are
-   * missing, only the new ones are kept: a line across a hole would be no measurement.
+   * missing, only the new ones are kept: a line across a hole would not be a measurement.
    */
   resume(trace: Trace): void {
     if (trace.t_s[0]! > this.last) this.clear();

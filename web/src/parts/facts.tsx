@@ -1,6 +1,6 @@
 import type { ComponentChildren } from "preact";
 
-export type Fact = [name: string, value: ComponentChildren];
+export type Fact = [name: ComponentChildren, value: ComponentChildren];
 
 /** A definition list of names and values, in columns. */
 export function Facts({ facts }: { facts: Fact[] }) {

@@ -1,11 +1,11 @@
-import { chipClass, stateText } from "../words/fault-state";
+import { chipClass, stateText, type Presence } from "../words/fault-state";
 import type { FaultState } from "../words/severity";
 
 /** The state of a fault that is named beside the chip. */
-export function StatusChip({ fault, hasSession }: { fault: FaultState; hasSession: boolean }) {
+export function StatusChip({ fault, presence }: { fault: FaultState; presence: Presence }) {
   return (
     <span class={chipClass(fault)}>
-      <b>{stateText(fault, hasSession)}</b>
+      <b>{stateText(fault, presence)}</b>
     </span>
   );
 }

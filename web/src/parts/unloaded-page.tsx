@@ -11,12 +11,14 @@ interface Props {
   what: string;
   /** What is asked for, if it may not exist: rig, fault, session. */
   kind?: string;
+  /** Whether the page has shown it already: it was deleted meanwhile. */
+  wasShown?: boolean;
   error: unknown;
   retry: () => Promise<unknown>;
 }
 
 /** A page without data: either loading or with an error. */
-export function UnloadedPage({ title, what, kind = "page", error, retry }: Props) {
+export function UnloadedPage({ title, what, kind = "page", wasShown, error, retry }: Props) {
   return (
     <main>
       {error ? (
@@ -24,9 +26,12 @@ export function UnloadedPage({ title, what, kind = "page", error, retry }: Props
           {title && <h1>{title}</h1>}
           {isNotFound(error) ? (
             <div role="alert">
-              <EmptyState title={`There is no such ${kind}`}>
+              <EmptyState title={wasShown ? `This ${kind} has been deleted` : `There is no such ${kind}`}>
                 <p>
-                  Its name may be mistyped, or it has been deleted. <Link to="/">Go to the fleet</Link>
+                  {wasShown
+                    ? "Somebody deleted it while this page was open, with its recordings and faults."
+                    : "Its name may be mistyped, or it has been deleted."}{" "}
+                  <Link to="/">Go to the fleet</Link>
                 </p>
               </EmptyState>
             </div>

@@ -16,11 +16,24 @@ export const chipClass = (fault: FaultState) => {
   return `chip chip-${standing(fault)}${seen}`;
 };
 
+/** Whether data of a rig arrive: during an open session they do or have stopped; without one, none are expected. */
+export type Presence = "arriving" | "silent" | "ended";
+
+/** Whether data arrive, by what the service tells with a fault or an alarm. */
+export function presenceOf(rig: {
+  session_open?: boolean | null;
+  communication_lost_since?: string | null;
+}): Presence {
+  if (!rig.session_open) return "ended";
+  return rig.communication_lost_since ? "silent" : "arriving";
+}
+
 /**
- * Whether the result of a test is one of now: there is an open session, and the test has had a result in it. Otherwise
- * it is that of an earlier session.
+ * Whether the result of a test is one of now: data arrive, and the test has had a result in their session. Otherwise
+ * it is an earlier one.
  */
-export const isPresent = ({ tested }: FaultState, hasSession: boolean) => hasSession && tested;
+export const isPresent = ({ tested }: Pick<FaultState, "tested">, presence: Presence) =>
+  presence === "arriving" && tested;
 
 /** The word for a status of a fault. */
 export const statusWord = <T extends string>(status: T) => (status === "pending" ? "suspected" : status);
@@ -33,16 +46,20 @@ function recordedText({ status }: FaultState, since?: string): string {
   return `${was}, passes again`;
 }
 
-/**
- * Returns the state of a fault as text. `hasSession` says whether a session is open, `since` when its test began to
- * fail.
- */
-export function stateText(fault: FaultState, hasSession = true, since?: string): string {
-  const isNow = isPresent(fault, hasSession);
-  const began = since ? (isNow ? ` since ${since}` : `, began ${since}`) : "";
+/** A test that fails, or failed at the end: `now` or `past`, and since when. */
+function failureText(now: string, past: string, isNow: boolean, since?: string): string {
+  if (isNow) return since ? `${now} since ${since}` : now;
+  // The time comes first: without room, the end is cut.
+  return since ? `${past} ${since}, when last tested` : `${past} when last tested`;
+}
+
+/** Returns the state of a fault as text. `since` says when its test began to fail. */
+export function stateText(fault: FaultState, presence: Presence = "arriving", since?: string): string {
+  const isNow = isPresent(fault, presence);
+  const silence = presence === "silent" ? "; now silent" : "";
   const text = {
-    failing: (isNow ? "failing" : "failed when last tested") + began,
-    pending: (isNow ? "suspected" : "suspected when last tested") + began,
+    failing: failureText("failing", "failed", isNow, since) + silence,
+    pending: failureText("suspected", "suspected", isNow, since) + silence,
     recorded: recordedText(fault, since),
     none: fault.status,
   }[standing(fault)];

@@ -1,5 +1,5 @@
 /** Words about how the samples of a rig arrive. */
-import type { LinkStretch, UnjudgedReason } from "../api/types";
+import type { LinkStretch, RigLink, UnjudgedReason } from "../api/types";
 import { count, NONE, number } from "./numbers";
 import { duration } from "./time";
 
@@ -52,6 +52,10 @@ export function unjudgedText({ unjudged }: LinkStretch): string {
   const all = unjudged.reduce((sum, { rows }) => sum + rows, 0);
   return `${count(all)}: ${unjudged.map(({ rows, reason }) => `${count(rows)} ${REASONS[reason]}`).join(", ")}`;
 }
+
+/** The keys of the telemetry that are not understood: x (x_m?). */
+export const unknownText = ({ unknown }: Pick<RigLink, "unknown">): string =>
+  unknown.map(({ key, meant }) => (meant ? `${key} (${meant}?)` : key)).join(", ");
 
 /** How far the device's clock is behind that of the service by `offset`, s. */
 export function clockText(offset: number | null | undefined): string {

@@ -17,6 +17,10 @@ const WORDS: Record<string, string> = {
     "an earlier calibration.",
 };
 
+const DELETED = "Somebody has deleted this since the page showed it, so nothing was saved.";
+
 /** Returns the words for a problem whose detail is for programs; undefined if its detail is for people. */
-export const problemWords = ({ type }: Partial<Problem>): string | undefined =>
-  type?.startsWith(PREFIX) ? WORDS[type.slice(PREFIX.length)] : undefined;
+export function problemWords({ type, etag }: Partial<Problem>): string | undefined {
+  if (type === `${PREFIX}changed` && !etag) return DELETED;
+  return type?.startsWith(PREFIX) ? WORDS[type.slice(PREFIX.length)] : undefined;
+}

@@ -14,8 +14,7 @@ export const capitalised = (text: string) => text.charAt(0).toUpperCase() + text
 
 /** Returns what a line reports as a sentence: what was seen, or what became of the fault. */
 export function lineSentence(line: Pick<FaultLine, "status" | "status_byte" | "summary">): string {
-  if (isRepair(line))
-    return `Its test passes again; the fault stays on record as ${statusWord(line.status)}.`;
+  if (isRepair(line)) return `Passing again; was ${statusWord(line.status)}.`;
   if (line.status === "healed") return "Enough sessions without the fault followed.";
   if (line.status === "cleared") return "It was removed from the fault memory.";
   return sentence(line.summary);

@@ -1,6 +1,7 @@
 /** The verdict of a session as text. */
 import type { Candidate, FaultCode, FaultLine, JudgedMonitor, Outcome, Summary } from "../api/types";
 import { codeTitle, faultTitle, kindText } from "./fault-names";
+import { seconds } from "./numbers";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
 
@@ -20,7 +21,7 @@ export function ambiguousCauses(candidates: Candidate[]): string {
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }
 
-type Finding = Pick<FaultLine, "code" | "kind" | "status"> & Partial<Pick<FaultLine, "candidates">>;
+type Finding = Pick<FaultLine, "code" | "kind" | "status" | "t_s"> & Partial<Pick<FaultLine, "candidates">>;
 
 const RESULTS: Partial<Record<Outcome, string>> = { pending: "suspected", "not learnt": "not calibrated" };
 
@@ -30,16 +31,28 @@ export const resultText = (outcome: Outcome) => RESULTS[outcome] ?? outcome;
 /** Whether `profile` has a test for a code: that of the book tests the servos only. */
 const hasTest = (code: string, profile?: string | null) => profile !== "textbook" || code.endsWith("_servo");
 
+/** Returns each kind of a confirmed code as text, with the time at which it was first named. */
+function kindsOf(code: FaultCode, monitor: JudgedMonitor | undefined, lines: Finding[]): [string, number][] {
+  if (monitor?.kinds?.length)
+    return monitor.kinds.map(({ kind, t_s, weight }) => [kindText({ code, kind, kind_weight: weight }), t_s]);
+  // An earlier version has stored the summary without them.
+  const named = lines.filter((line) => line.code === code && line.status === "confirmed" && line.kind);
+  const firsts = named.filter(({ kind }, i) => named.findIndex((line) => line.kind === kind) === i);
+  return firsts.map((line) => [kindText(line), line.t_s]);
+}
+
 /**
  * Returns the title of a fault with the kind that was confirmed first and those named later, or its candidates if its
  * monitor could not distinguish them.
  */
 function faultText(summary: Summary, code: FaultCode, lines: Finding[]): string {
-  const monitor = summary.monitors?.find((each) => each.code === code && each.outcome === "cannot tell");
-  const confirmed = lines.filter((line) => line.code === code && line.status === "confirmed");
-  const kinds = new Map(confirmed.flatMap((line) => (line.kind ? [[line.kind, kindText(line)]] : [])));
-  const named = kinds.size ? ` (${[...kinds.values()].join(", later ")})` : "";
-  return ambiguousCauses(monitor?.candidates ?? []) || codeTitle(code) + named;
+  const monitor = summary.monitors?.find((each) => each.code === code);
+  const causes = monitor?.outcome === "cannot tell" ? ambiguousCauses(monitor.candidates) : "";
+  if (causes) return causes;
+  const [first, ...later] = kindsOf(code, monitor, lines);
+  if (!first) return codeTitle(code);
+  const others = later.map(([kind, t_s]) => `, later ${kind} at ${seconds(t_s)}`);
+  return `${codeTitle(code)} (${first[0]}${others.join("")})`;
 }
 
 export interface Verdict {
@@ -54,16 +67,21 @@ function listed(monitors: JudgedMonitor[], outcome: Outcome, words: string): str
   return titles.length ? `${words}: ${titles.join(", ")}` : "";
 }
 
+/** Whether a wrong unit explains the faults as well, as a warning of the summary says. */
+const isExcused = ({ outcome, monitors }: Summary) =>
+  outcome === "cannot tell" && !monitors?.some((each) => each.outcome === outcome);
+
 /**
  * Returns the result of a session, with the monitors that did not judge it, and its style. The kinds of its faults are
- * in the lines of their changes. `profile` is the one that it was judged by, if that is known.
+ * in the summary, or else in the lines of their changes. `profile` is the one that it was judged by, if that is known.
  */
 export function verdict(summary: Summary, lines: Finding[] = [], profile?: string | null): Verdict {
   if (summary.outcome === "not judged") return { text: "Not judged", look: "quiet" };
   const all = summary.monitors ?? [];
   const tested = all.filter(({ code }) => hasTest(code, profile));
   const others = all.filter(({ code }) => !hasTest(code, profile));
-  const found = summary.faults.map((code) => faultText(summary, code, lines)).join(", ");
+  const faults = summary.faults.map((code) => faultText(summary, code, lines)).join(", ");
+  const found = isExcused(summary) ? `Cannot tell a wrong unit from ${faults}` : faults;
   const suspected = listed(all, "pending", "Suspected only");
   const passed = listed(all, "no fault", "No fault");
   const rest = [

@@ -37,7 +37,7 @@ test("a rig whose data stay away is silent since its last data, until they are b
   assert.deepEqual([back.silent, back.communication_lost_since], [false, null]);
 });
 
-test("each loss of communication is an event of its own", () => {
+test("each loss of communication is a separate event", () => {
   const first = communication("confirmed", { event: 1, since: "2026-01-01T11:00:00Z" });
   const again = communication("confirmed", { event: 3 });
   assert.deepEqual(withLine([first], again), [again, first]);
@@ -70,6 +70,13 @@ test("a rig is tested while only its lost communication is muted", () => {
   const suspected = { ...failing, status: "pending" };
   assert.deepEqual(alarmState(suspected), { text: "△ suspected", look: "status-pending" });
   assert.equal(alarmState({ ...suspected, tested: false }).text, "suspected when last tested");
+  const silent = { ...failing, communication_lost_since: SINCE };
+  assert.match(alarmState(silent).text, /^▲ failed when last tested; silent since .*2026/);
+  assert.match(
+    alarmState({ ...silent, status: "pending" }).text,
+    /^suspected when last tested; silent since /,
+  );
+  assert.equal(alarmState({ ...silent, code: "communication_lost" }).text, "▲ no data now");
   const ended = { ...failing, session_open: false };
   assert.equal(alarmState(ended).text, "▲ failed when last tested");
   assert.equal(alarmState({ ...ended, code: "communication_lost" }).text, "▲ no data now");

@@ -1,7 +1,13 @@
 // Two sessions on one time axis.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { alignedMarks, alignedTrace, commonRange, readCompare } from "../../src/pages/compare/align.ts";
+import {
+  alignedMarks,
+  alignedTrace,
+  commonRange,
+  readCompare,
+  valuesAt,
+} from "../../src/pages/compare/align.ts";
 import { withToggled } from "../../src/pages/sessions/with-toggled.ts";
 import { comparePath } from "../../src/router/paths.ts";
 
@@ -30,4 +36,15 @@ test("at most two sessions are chosen", () => {
   const chosen = ["1", "2", "3"].reduce(withToggled, []);
   assert.deepEqual(chosen, ["2", "3"]);
   assert.deepEqual(withToggled(chosen, "2"), ["3"]);
+});
+
+test("of two curves in one chart, each has its latest value at a moment", () => {
+  const data = [
+    [0, 1, 2, 3],
+    [5, undefined, 7, undefined],
+    [undefined, 2, undefined, null],
+  ];
+  assert.deepEqual(valuesAt(data, 2.5), [7, 2]);
+  assert.deepEqual(valuesAt(data, 3), [7, null]);
+  assert.deepEqual(valuesAt(data, 0), [5, undefined]);
 });

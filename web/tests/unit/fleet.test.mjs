@@ -49,7 +49,7 @@ test("a rig that the service saw a moment ago stays as it is, however long ago t
   assert.equal(healthOf(seen), "ok");
 });
 
-test("a repair leaves the fault on record, and a new failure begins anew", () => {
+test("a repair leaves the fault on record, and a new failure begins again", () => {
   const failed = { ...fault("confirmed"), failed_at: ago(60), acknowledged: true };
   const repaired = afterEvent(rig("a", { faults: [failed] }), line("confirmed", { status_byte: "2E" }));
   assert.equal(healthOf(repaired), "recorded");

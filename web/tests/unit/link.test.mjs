@@ -1,7 +1,15 @@
 // How the samples of a rig arrive, in words.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { clockText, delayText, gapsText, rateText, spacingText, unjudgedText } from "../../src/words/link.ts";
+import {
+  clockText,
+  delayText,
+  gapsText,
+  rateText,
+  spacingText,
+  unjudgedText,
+  unknownText,
+} from "../../src/words/link.ts";
 
 const plain = (text) => text.replaceAll("\u202f", " ");
 
@@ -38,4 +46,12 @@ test("a clock that counts from the start of the device tells no time of day", ()
   assert.equal(plain(clockText(12.34)), "is 12 s behind the clock of the service");
   assert.equal(plain(clockText(-90)), "is 1 min 30 s ahead of the clock of the service");
   assert.equal(clockText(null), "–");
+});
+
+test("keys that are not understood are named with those that are probably meant", () => {
+  const unknown = [
+    { key: "x", meant: "x_m" },
+    { key: "colour", meant: null },
+  ];
+  assert.equal(unknownText({ unknown }), "x (x_m?), colour");
 });

@@ -25,7 +25,7 @@ test("a name that is taken stays with its view", () => {
   assert.deepEqual(withoutView(VIEWS, "all"), [VIEWS[0]]);
 });
 
-test("what is no view is left out", () => {
+test("what is not a view is left out", () => {
   assert.deepEqual(parseViews(JSON.stringify([...VIEWS, null, 7, { name: "a" }])), VIEWS);
   for (const wrong of [null, "", "{", "7", "{}"]) assert.deepEqual(parseViews(wrong), [], wrong);
 });

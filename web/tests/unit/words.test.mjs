@@ -45,13 +45,22 @@ test("a fault that fails now, one on record and an acknowledged one look differe
   const fails = { status: "confirmed", failing: true, tested: true };
   const passes = { status: "confirmed", failing: false, tested: true };
   assert.equal(stateText(fails), "failing");
-  assert.equal(stateText(fails, true, "6:09"), "failing since 6:09");
-  assert.equal(stateText(fails, false), "failed when last tested", "no session is open");
+  assert.equal(stateText(fails, "arriving", "6:09"), "failing since 6:09");
+  assert.equal(stateText(fails, "ended"), "failed when last tested", "no session is open");
+  assert.equal(stateText(fails, "silent"), "failed when last tested; now silent");
+  assert.equal(stateText(fails, "silent", "6:09"), "failed 6:09, when last tested; now silent");
+  assert.equal(
+    stateText({ ...fails, status: "pending" }, "silent", "6:09"),
+    "suspected 6:09, when last tested; now silent",
+  );
   const earlier = { ...fails, tested: false };
   assert.equal(stateText(earlier), "failed when last tested", "in a session before the open one");
   assert.equal(stateText({ ...earlier, status: "pending" }), "suspected when last tested");
   assert.equal(stateText(passes), "was confirmed, passes again");
-  assert.equal(stateText({ ...passes, status: "pending" }, true, "6:09"), "suspected 6:09, passes again");
+  assert.equal(
+    stateText({ ...passes, status: "pending" }, "arriving", "6:09"),
+    "suspected 6:09, passes again",
+  );
   assert.equal(stateText({ ...fails, acknowledged: true }), "failing, acknowledged");
   assert.equal(stateText({ status: "cleared", failing: false, acknowledged: true }), "cleared");
   const looks = [fails, passes, { ...fails, acknowledged: true }, { status: "pending", failing: true }];
@@ -66,7 +75,7 @@ test("a test that passes again is told as a repair and not as an alarm", () => {
   assert.deepEqual(changeOf(passes), { text: "passes again", look: "status-passed" });
   assert.deepEqual(changeOf({ ...passes, status: "healed" }), { text: "healed", look: "status-healed" });
   assert.equal(lineSentence(fails), "It is dead.");
-  assert.equal(lineSentence(passes), "Its test passes again; the fault stays on record as confirmed.");
+  assert.equal(lineSentence(passes), "Passing again; was confirmed.");
   assert.equal(faultMark(fails).label, "X servo confirmed");
   assert.deepEqual(faultMark({ ...passes, axis: "x" }), {
     t: 2,
@@ -157,6 +166,11 @@ test("an ambiguous fault is shown with its candidates", () => {
   assert.equal(verdict(of).text, "Cannot tell: X servo 50 % or Stuck ball 50 %");
 });
 
+test("a fault that a wrong unit explains as well is not told as one", () => {
+  const { text } = verdict(summary({ x_servo: "fault" }, ["x_servo"], "cannot tell"));
+  assert.equal(text, "Cannot tell a wrong unit from X servo");
+});
+
 test("a judged share has its duration", () => {
   assert.equal(judgedShare({ judged_share: 0.456, judged_s: 119.6 }), "46 %, 2\u202fmin 0\u202fs");
   assert.equal(judgedShare({}), "0 %, 0.0\u202fs");
@@ -166,20 +180,4 @@ test("a message is told without codes and times of the interface", () => {
   const text = deliverySummary("my_x_servo-1: x_servo (dead) confirmed since 4.50 s: qy asks for -0.2 m/s²");
   assert.equal(text, "my_x_servo-1: X servo (dead) confirmed since 4.50 s: qy asks for −0.2 m/s²");
   assert.doesNotMatch(deliverySummary("a: last heard 2026-11-25T20:02:59.031397Z"), /T20/);
-});
-
-test("a verdict tells the kind that was confirmed first, and those named later", () => {
-  const of = { outcome: "fault", faults: ["x_servo", "sensor"], monitors: [] };
-  const line = (code, status, kind) => ({ code, status, kind });
-  const lines = [
-    line("x_servo", "pending", "gain"),
-    line("x_servo", "confirmed", null),
-    line("x_servo", "confirmed", "dead"),
-    line("x_servo", "confirmed", null),
-    line("sensor", "pending", "noise"),
-  ];
-  assert.equal(verdict(of, lines).text, "X servo (dead), Position sensor");
-  assert.equal(verdict(of).text, "X servo, Position sensor");
-  const revised = [line("x_servo", "confirmed", "offset"), line("x_servo", "confirmed", "slow")];
-  assert.equal(verdict(of, revised).text, "X servo (offset, later slow), Position sensor");
 });

@@ -89,7 +89,7 @@ fn march<'a, E: OdeEquations<T = f64> + 'a>(
     Ok(positions)
 }
 
-/// Stopped and begun anew at first order after every tick, as where the plate's
+/// Stopped and begun again at first order after every tick, as where the plate's
 /// next reading is awaited; the step size and the Jacobian are carried over.
 fn restarted(scene: Scene, tolerance: f64, times: &[f64]) -> Result<Vec<[f64; 2]>> {
     let problem = compliant_problem(scene, tolerance)?;

@@ -2,7 +2,7 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
-use crate::vocabulary::{FaultCode, PerAxis};
+use crate::vocabulary::{Axis, FaultCode, PerAxis};
 use core::fmt;
 use serde::{Deserialize, Serialize};
 
@@ -42,10 +42,9 @@ pub struct AxisCalibration {
     pub model_error_m_s2: f64,
     /// Largest evidence against the servo while it was healthy, nats.
     pub most_nats: f64,
-    /// Largest root mean square deviation of the path from the twin's over two seconds
-    /// expected of the healthy servo, m: the largest that the tests have shown, plus a
-    /// margin if they were few. Zero if unknown.
-    pub most_path_error_m: f64,
+    /// Largest evidence of the path against the servo while it was healthy, nats; `None` if
+    /// unknown.
+    pub most_path_nats: Option<f64>,
     /// The 95 % quantile of the accelerations in the recording, m/s²: beyond it gain and
     /// delay are less well known. Infinite if not learnt.
     pub familiar_m_s2: f64,
@@ -122,6 +121,17 @@ pub struct Prospects {
     pub frozen_s: Option<f64>,
     /// Median delay for a ball that is not seen, s.
     pub unseen_s: Option<f64>,
+}
+
+impl Prospects {
+    /// Whether no fault of a servo that was tried would be found.
+    #[must_use]
+    pub fn are_blind(&self) -> bool {
+        let finds = |servo: &ServoProspects| {
+            servo.dead_s.or(servo.half_gain_s).or(servo.offset_1deg_s).is_some()
+        };
+        !Axis::ALL.into_iter().filter_map(|axis| self.servos[axis].as_ref()).any(finds)
+    }
 }
 
 /// Test result of one monitor on healthy recordings that were not used to learn, and the

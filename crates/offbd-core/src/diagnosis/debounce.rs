@@ -38,8 +38,8 @@ impl DebounceTimes {
     /// Returns the times for `code`. Servos have a slow leak, because a loose contact
     /// comes and goes. Readings and ball fail sooner. A ball that stands fails as soon as
     /// readings do on a learnt rig, unless there is a `rival` cause with the same
-    /// symptoms, which needs time to show. Of the sensor's kinds of fault, noise has a
-    /// time of its own.
+    /// symptoms, which needs time to show. Of the sensor's kinds of fault, noise has
+    /// its own time.
     #[must_use]
     pub fn of(code: FaultCode, kind: Option<FaultKind>, rival: bool, settings: &Settings) -> Self {
         let Settings { fail_s, confirm_s, pass_s, .. } = *settings;

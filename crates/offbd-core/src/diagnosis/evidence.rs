@@ -29,11 +29,11 @@ pub struct AxisEvidence {
     /// Evidence for a fault of the servo, nats: the log-likelihood ratio of a broken to a
     /// healthy servo.
     pub nats: f64,
-    /// Root mean square deviation of the path of the last two seconds from the twin's, m;
-    /// `None` if not testable.
-    pub path_error_m: Option<f64>,
-    /// Limit of that deviation, m; `None` if unknown.
-    pub path_limit_m: Option<f64>,
+    /// Evidence of the recent path for a fault of the servo, nats; the scale of the twin's error is
+    /// estimated from this session. `None` if not testable.
+    pub path_nats: Option<f64>,
+    /// Limit of the evidence of the recent path (`path_nats`), nats; `None` if unknown.
+    pub path_limit_nats: Option<f64>,
     /// The servo's recent response to its command.
     pub answer: Option<ServoAnswer>,
     /// Time for which the readings along this axis have been bit-identical, s.
@@ -47,17 +47,10 @@ impl AxisEvidence {
         Some(self.measured_m_s2? - self.twin_m_s2?)
     }
 
-    /// Whether the path deviates from the twin's by the limit or more.
+    /// Whether the evidence of the path reaches its limit.
     #[must_use]
     pub fn is_off_path(&self) -> bool {
-        self.path_share().is_some_and(|share| share >= 1.0)
-    }
-
-    /// Deviation of the path from the twin's as a fraction of the limit; `None` if either
-    /// is unknown.
-    #[must_use]
-    pub fn path_share(&self) -> Option<f64> {
-        Some(self.path_error_m? / self.path_limit_m?)
+        self.path_nats.zip(self.path_limit_nats).is_some_and(|(nats, limit)| nats >= limit)
     }
 
     /// Whether the axis is enabled and its residual at or beyond the limit.

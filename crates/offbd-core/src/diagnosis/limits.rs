@@ -84,9 +84,8 @@ pub struct Limits {
     /// Time for which readings of a ball that may be at rest may be identical, s; `None`
     /// if unknown.
     pub rest_repeat_s: Option<f64>,
-    /// Largest root mean square deviation of the path from the twin's over two seconds,
-    /// m; `None` if unknown.
-    pub path_m: Option<f64>,
+    /// Evidence of the path from which on the servo fails, nats; `None` if unknown.
+    pub path_nats: Option<f64>,
 }
 
 /// Acceleration that counts as asking a ball to move on any rig, m/s²: one degree of
@@ -133,13 +132,14 @@ const BREAKAWAY_FACTOR: f64 = 1.5;
 /// Fraction of the learnt breakaway that is taken to brake a rolling ball. Chosen.
 const ROLL_OUT_SHARE: f64 = 0.5;
 
-/// Factor on the largest healthy deviation of the path: of 700 faults put into servos of
-/// real rigs 184 were found with it, 171 with 1.4.
-const PATH_FACTOR: f64 = 1.2;
-/// Least limit of the deviation of the path, m: hands disturb it by as much on a rig that
-/// fits well. 40 simulated rigs with two pushes a minute had 27 false alarms of servos in
-/// 120 h with 4 mm, 23 with 5 mm, and some 80 with 2 mm.
-const LEAST_PATH_M: f64 = 5e-3;
+/// Evidence of the path that healthy servos show now and then, nats. Chosen: sessions of half
+/// a minute of simulated rigs whose misfit differs from session to session have 1 nat in the
+/// median and 3 nats in the upper quartile.
+const USUAL_PATH_NATS: f64 = 2.0;
+/// Evidence of the path beyond the largest healthy one from which on a servo fails, nats: a
+/// fault that is twenty times likelier than what the healthy rig has shown. Chosen
+/// beforehand.
+const PATH_MARGIN_NATS: f64 = 3.0;
 
 impl Limits {
     /// Returns the limits of `profile` for an axis, learnt or not. A tilt of one radian
@@ -162,7 +162,7 @@ impl Limits {
             noise_m: (!absent).then_some(UNKNOWN_READING_NOISE_M),
             repeat_s: UNKNOWN_REPEAT_S,
             rest_repeat_s: None,
-            path_m: None,
+            path_nats: None,
         };
         let known = learnt.map_or(wide, |l| Self {
             floor_m_s2: (HEALTHY_FACTOR * l.residual_m_s2).max(LEAST_FLOOR_M_S2),
@@ -179,8 +179,7 @@ impl Limits {
             repeat_s: (REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REPEAT_S),
             rest_repeat_s: (l.rest_s >= REST_SEEN_S.max(REST_SEEN_REPEATS * l.longest_repeat_s))
                 .then(|| (REST_REPEAT_FACTOR * l.longest_repeat_s).max(LEAST_REST_REPEAT_S)),
-            path_m: (l.most_path_error_m > 0.0)
-                .then(|| (PATH_FACTOR * l.most_path_error_m).max(LEAST_PATH_M)),
+            path_nats: l.most_path_nats.map(|most| most.max(USUAL_PATH_NATS) + PATH_MARGIN_NATS),
         });
         match profile {
             Profile::Default => known,
@@ -197,7 +196,7 @@ impl Limits {
             floor_m_s2: factor * self.floor_m_s2,
             share: factor * self.share,
             errors: factor * self.errors,
-            path_m: self.path_m.map(|m| factor * m),
+            path_nats: self.path_nats.map(|nats| factor * nats),
             ..*self
         }
     }

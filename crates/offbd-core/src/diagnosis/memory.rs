@@ -16,7 +16,7 @@ use super::StatusByte;
 /// When a fault counts as confirmed, healed and aged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryRules {
-    /// Operation cycles with a trip before bit 3 (confirmedDTC) is set; ≥ 1.
+    /// Number of operation cycles with a trip after which bit 3 (confirmedDTC) is set; at least 1.
     pub confirmation_threshold: u8,
     /// Whether confirmation requests the warning indicator (bit 7).
     pub indicator: bool,

@@ -432,7 +432,7 @@ mod tests {
     /// After a gap the ball may have rolled to where an outlier lies; it has not if the
     /// next reading is back on the path.
     #[test]
-    fn the_return_from_an_outlier_is_no_step() {
+    fn the_return_from_an_outlier_is_not_a_step() {
         let mut gate = OutlierGate::default();
         let mut take = |t: f64, x: f64| gate.take(t, along_x(x), 1e-3);
         for (t, x) in [(0.0, 0.02), (0.08, 0.02), (0.16, 0.02), (0.24, 0.02), (0.32, 0.02)] {
@@ -557,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hard_push_is_no_step() {
+    fn a_hard_push_is_not_a_step() {
         let mut gate = OutlierGate::default();
         for i in 0..100 {
             let t = f64::from(i) * 0.01;

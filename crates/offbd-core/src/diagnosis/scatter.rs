@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn a_push_and_a_bend_are_no_noise() {
+    fn a_push_and_a_bend_are_not_noise() {
         let bent = of(1e-4, |t| t * t / 2.0);
         let pushed = of(1e-4, |t| 0.5 * (t - 1.9).max(0.0));
         assert!(bent < 1.5e-4 && pushed < 1.5e-4, "{bent} {pushed}");

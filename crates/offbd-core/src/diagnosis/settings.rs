@@ -32,6 +32,12 @@ impl Profile {
             Self::Textbook => "textbook",
         }
     }
+
+    /// Whether it tests for faults of `code`: that of the book tests the servos only.
+    #[must_use]
+    pub const fn has_test(self, code: FaultCode) -> bool {
+        matches!(self, Self::Default) || code.axis().is_some()
+    }
 }
 
 impl fmt::Display for Profile {
@@ -147,7 +153,7 @@ impl Settings {
             period_s: BLOCK_S,
             gap_s: 0.3,
             reorder_s: 0.1,
-            // A push by hand shows in the estimate for one window; 0.1 s more.
+            // The estimate shows a push by hand for one window (`window_s`); 0.1 s are added.
             fail_s: 0.6,
             // A push neither shows in the readings themselves nor stops a ball.
             readings_fail_s: 0.3,

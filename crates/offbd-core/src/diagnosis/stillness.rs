@@ -138,7 +138,10 @@ impl AxisStillness {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
-    /// Time since a ball was last seen, s.
+    /// Whether a ball has been seen in this session.
+    pub has_positions: bool,
+    /// Time since a ball was last seen, s; before the first one, only the time for which one was
+    /// asked to move.
     pub unseen_s: f64,
     /// Fraction of recent samples without a ball, in [0, 1].
     pub missing: f64,
@@ -147,12 +150,23 @@ pub struct Stillness {
 }
 
 impl Stillness {
+    /// Forgets the readings.
+    pub fn restart(&mut self) {
+        *self = Self { has_positions: self.has_positions, ..Self::default() };
+    }
+
     /// Takes one sample.
     pub fn update(&mut self, reading: &Reading) {
         let seen = Axis::ALL.iter().any(|&a| reading.position_m[a].is_some());
-        self.unseen_s = if seen { 0.0 } else { self.unseen_s + reading.dt };
-        let fade = MISSING_MEMORY_S / (MISSING_MEMORY_S + reading.dt);
-        self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
+        // A session may begin before the ball is set down; commands that ask it to move say that it
+        // should be there.
+        let asked = Axis::ALL.iter().any(|&a| reading.asked_m_s2[a] > 0.0);
+        self.has_positions |= seen;
+        if asked || self.has_positions {
+            self.unseen_s = if seen { 0.0 } else { self.unseen_s + reading.dt };
+            let fade = MISSING_MEMORY_S / (MISSING_MEMORY_S + reading.dt);
+            self.missing = self.missing * fade + if seen { 0.0 } else { 1.0 - fade };
+        }
         self.outliers *= OUTLIER_MEMORY_S / (OUTLIER_MEMORY_S + reading.dt);
         self.outliers += f64::from(reading.outliers);
         if reading.refused {
@@ -231,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn one_reading_that_strays_is_no_motion_and_two_are() {
+    fn one_reading_that_strays_is_not_motion_and_two_are() {
         let mut watch = Stillness::default();
         for (i, x) in [0.0, 0.0, 0.01, 0.0, 0.0, 0.01, 0.01].into_iter().enumerate() {
             watch.update(&reading(Some(x), true));
@@ -257,11 +271,18 @@ mod tests {
     #[test]
     fn a_ball_not_seen_is_counted_in_seconds_and_in_share() {
         let mut watch = Stillness::default();
+        for _ in 0..300 {
+            watch.update(&reading(None, false));
+        }
+        assert_eq!((watch.unseen_s, watch.missing), (0.0, 0.0), "nobody asks for a ball yet");
         for _ in 0..200 {
             watch.update(&reading(None, true));
         }
         assert!((watch.unseen_s - 2.0).abs() < 1e-9);
         // The fraction seen fades as (1 + dt/memory)⁻ⁿ.
         assert!((watch.missing - (1.0 - 1.005_f64.powi(-200))).abs() < 1e-9);
+        watch.update(&reading(Some(0.1), false));
+        watch.update(&reading(None, false));
+        assert!(watch.unseen_s > 0.0, "a ball that was there is missing, whatever is asked");
     }
 }

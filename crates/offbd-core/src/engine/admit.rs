@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_sample_is_named() {
+    fn what_is_not_a_sample_is_named() {
         let mapping = AxisMapping::default();
         assert_eq!(check(&mapping, &at(1.0)), Ok(()));
         let nan = Sample { y_m: Some(f64::NAN), ..at(1.0) };
@@ -59,6 +59,9 @@ mod tests {
         let far = Sample { x_m: Some(-1e9), ..at(1.0) };
         let reason = check(&mapping, &far).unwrap_err();
         assert_eq!(reason.to_string(), "x_m is -1000000000, beyond ±50");
+        let reason = check(&mapping, &at(1_771_570_260_336.0)).unwrap_err();
+        let told = "t_s is 1771570260336, beyond ±1000000000000; its unit is s";
+        assert_eq!(reason.to_string(), told);
         let turn = Sample { cmd_qx_rad: Some(400.0), ..Sample::default() };
         let degrees = AxisMapping { command_unit_rad: 0.017_453_292_5, ..AxisMapping::default() };
         let reason = check(&degrees, &turn).unwrap_err();
@@ -68,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn infinite_numbers_are_no_samples() {
+    fn infinite_numbers_are_not_samples() {
         let rig = Rig::chapter("rig");
         let infinite = Sample { x_m: Some(f64::INFINITY), ..at(1.0) };
         assert_eq!(rejection(&rig, &infinite), Some(Rejection::NotFinite { field: "x_m" }));

@@ -173,7 +173,7 @@ impl DeviceClock {
         ClockDecision::Believed { held, set_back: step_s < 0.0 }
     }
 
-    /// Gives up the samples held back: the clock goes on as before.
+    /// Drops the samples that were held back; the clock goes on as before.
     pub(super) fn drop_held(&mut self) {
         self.n_dropped += self.held.len() as u64;
         // Keeps no memory: samples are rarely held back, and then often only once.

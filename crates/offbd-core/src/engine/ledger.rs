@@ -2,7 +2,7 @@
 //!
 //! The key of a sample is its `seq` or, without one, its `t_s`. The same key with the same
 //! values is a retransmission; with other values it is a conflict: the device has started
-//! anew, or two devices use one name. Keys beyond the memory of the ledger are not guessed:
+//! again, or two devices use one name. Keys beyond the memory of the ledger are not guessed:
 //! the caller can look them up in the recording.
 
 use alloc::collections::VecDeque;

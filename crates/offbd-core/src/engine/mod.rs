@@ -63,12 +63,12 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 4;
+pub const JUDGEMENT: u32 = 5;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
 /// fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 6;
+pub const SNAPSHOT_FORMAT: u32 = 8;
 
 /// The pipeline of one rig for one session (one operation cycle).
 ///
@@ -89,7 +89,7 @@ pub struct Engine {
     n_accepted: u64,
     /// Samples that were too late to be judged.
     n_late: u64,
-    /// Begins anew after a restart.
+    /// Begins again after a restart.
     #[serde(skip)]
     last_samples: LastSamples,
 }
@@ -268,7 +268,7 @@ impl Engine {
         self.pipeline.set_clock_back();
     }
 
-    /// The interval without a sample that makes a gap, after which evidence begins anew, s.
+    /// The interval without a sample that makes a gap, after which evidence begins again, s.
     #[must_use]
     pub fn gap_s(&self) -> f64 {
         self.setup.settings.gap_after_s(1.0 / self.setup.rig.sample_rate_hz)
@@ -325,9 +325,9 @@ impl Engine {
         self.pipeline.thresholds(code)
     }
 
-    /// Largest deviation of the path of each axis from the twin's so far, m.
-    fn most_path_error_m(&self) -> PerAxis<f64> {
-        self.pipeline.most_path_error_m()
+    /// Largest evidence of the path of each axis so far, nats.
+    fn most_path_nats(&self) -> PerAxis<f64> {
+        self.pipeline.most_path_nats()
     }
 
     /// Largest evidence against each servo so far, nats.

@@ -42,7 +42,7 @@ const LEAST_JUDGED_SAMPLES: f64 = LEAST_SAMPLES / 2.0;
 /// Chosen: seldom reached, and small enough that positions keep their digits.
 const REBASE_M: f64 = 1.0;
 
-const _: () = assert!(LONGEST_GAP_S <= LONGEST_SPAN_S, "the twin computes whatever is no gap");
+const _: () = assert!(LONGEST_GAP_S <= LONGEST_SPAN_S, "the twin computes whatever is not a gap");
 
 /// The state of the stages.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -244,7 +244,7 @@ impl Pipeline {
     fn restart(&mut self) {
         self.twin.restart();
         Axis::ALL.into_iter().for_each(|axis| self.servos[axis].restart());
-        self.readings = Stillness::default();
+        self.readings.restart();
         self.edge.restart();
         self.gate.restart();
         self.forget();
@@ -469,8 +469,8 @@ impl Pipeline {
             limit_m_s2: self.evaluator.limits()[axis].at(twin.unwrap_or(0.0), error),
             enabled: false,
             nats: servo.nats(),
-            path_error_m: servo.path_error_m(),
-            path_limit_m: self.evaluator.limits()[axis].path_m,
+            path_nats: servo.path_nats(),
+            path_limit_nats: self.evaluator.limits()[axis].path_nats,
             answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
             identical_s: self.readings.axes[axis].identical_s,
         }
@@ -577,9 +577,9 @@ impl Pipeline {
         PerAxis::from_fn(|axis| self.monitors[FaultCode::servo(axis) as usize].most_nats())
     }
 
-    /// Largest deviation of the path of each axis from the twin's so far, m.
-    pub(super) fn most_path_error_m(&self) -> PerAxis<f64> {
-        PerAxis::from_fn(|axis| self.servos[axis].most_path_error_m())
+    /// Largest evidence of the path of each axis so far, nats.
+    pub(super) fn most_path_nats(&self) -> PerAxis<f64> {
+        PerAxis::from_fn(|axis| self.servos[axis].most_path_nats())
     }
 
     /// The closest approach of each monitor to an alarm by duration of failure, 0 to 1,

@@ -120,7 +120,8 @@ impl Rig {
             || is_path
         {
             let reason = format!(
-                "must be 1 to {MAX_NAME} letters, digits, `-`, `_` or `.`, and not `.` or `..`"
+                "must be 1 to {MAX_NAME} of the characters A-Z, a-z, 0-9, `-`, `_` and `.`, and not \
+                 `.` or `..`"
             );
             return Err(Invalid::new("/name", reason));
         }

@@ -19,7 +19,7 @@ fn hundredths(number: f64) -> String {
 pub enum Input {
     /// A row of telemetry, in order of arrival; it may be a retransmission.
     Sample(Sample),
-    /// A row that is no retransmission: one of a recording, or one that the recording does
+    /// A row that is not a retransmission: one of a recording, or one that the recording does
     /// not contain.
     NewSample(Sample),
     /// A person clears a code.
@@ -52,7 +52,7 @@ pub enum Admission {
 pub enum Rejection {
     #[error("{field} is not a finite number")]
     NotFinite { field: &'static str },
-    #[error("{field} is {}, beyond ±{}", Brief(*value), hundredths(*limit))]
+    #[error("{field} is {}, beyond ±{}{}", Brief(*value), hundredths(*limit), unit(field))]
     Absurd { field: &'static str, value: f64, limit: f64 },
     #[error("t_s is {behind_s:.3} s before the last judged sample: recorded, not judged")]
     Late { behind_s: f64 },
@@ -60,14 +60,19 @@ pub enum Rejection {
     Jump { step_s: f64 },
     #[error(
         "another sample with this {key} is recorded, with other values: a device that starts \
-         anew needs a new session, and two devices need two names"
+         again needs a new session, and two devices need two names"
     )]
     Conflict { key: &'static str },
     #[error("too old to tell whether it is recorded: send it in a batch that spans less time")]
     TooOld,
     /// Given by a caller that cannot read it.
-    #[error("it is no sample: the answer to its batch says what is wrong")]
+    #[error("it is not a sample: the answer to its batch says what is wrong")]
     Malformed,
+}
+
+/// Says the unit of a time, which clocks often have otherwise.
+fn unit(field: &str) -> &'static str {
+    if field == "t_s" { "; its unit is s" } else { "" }
 }
 
 impl Rejection {

@@ -108,7 +108,7 @@ mod tests {
         last.judge_last(1);
         assert_eq!(last.unjudged(), None);
         last.note_unjudged(WHY);
-        assert_eq!(last.unjudged(), None, "it begins anew");
+        assert_eq!(last.unjudged(), None, "it begins again");
     }
 
     proptest! {

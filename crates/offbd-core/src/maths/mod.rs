@@ -2,14 +2,12 @@
 //!
 //! Pure functions of numbers; knows nothing of rigs.
 
-mod kinked_parabola;
 mod runge_kutta;
 pub mod sine;
 mod sliding_quadratic;
 mod statistics;
 mod system;
 
-pub use kinked_parabola::kinked_parabola_rms;
 pub use runge_kutta::{
     DOPRI5, EULER, Estimated, MIDPOINT, RK4, RungeKutta, dopri5, semi_implicit_euler,
 };

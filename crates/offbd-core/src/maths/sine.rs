@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_angle_has_no_sine() {
+    fn what_is_not_an_angle_has_no_sine() {
         for angle in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let (sin, cos) = sin_cos(angle);
             assert!(sin.is_nan() && cos.is_nan(), "{angle}");

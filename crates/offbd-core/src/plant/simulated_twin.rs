@@ -1,4 +1,4 @@
-//! The twin in a simulation of its own: the ball that it observes is its own, and has a spin.
+//! The twin in its own simulation: the ball that it observes is separate, and has a spin.
 //!
 //! The twin of a rig follows a ball whose spin about the plate's normal no sensor sees; here the
 //! spin is integrated too, by explicit Euler, from the plate's angles at both ends of a step.

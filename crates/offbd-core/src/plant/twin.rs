@@ -43,7 +43,7 @@ pub struct TwinAxis {
     pub servo: ServoModel,
     /// Time from a command to the servo's first movement, s.
     pub dead_time_s: f64,
-    /// Angle that the servo is asked for over its command, dimensionless; 1 unless a fault is
+    /// Angle asked of the servo, as a multiple of its command, dimensionless; 1 unless a fault is
     /// simulated. It acts after the dead time and before the angle limit.
     pub command_gain: f64,
     /// Measured over modelled acceleration, dimensionless; 1 if units and ball are as the

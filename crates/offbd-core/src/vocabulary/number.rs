@@ -58,5 +58,11 @@ pub fn positive(element: &str, value: f64, most: f64) -> Result<f64, Invalid> {
     if value > 0.0 && value <= most {
         return Ok(value);
     }
-    Err(Invalid::new(element, format!("{} is not above 0 and at most {most}", Brief(value))))
+    let metres = value / 1e3;
+    let unit = if element.ends_with("_m") && value > most && metres <= most {
+        format!(": the unit is m, so {value} mm are {metres}")
+    } else {
+        String::new()
+    };
+    Err(Invalid::new(element, format!("{} is not above 0 and at most {most}{unit}", Brief(value))))
 }

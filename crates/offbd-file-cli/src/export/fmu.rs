@@ -24,8 +24,9 @@ use offbd_wire::fmu::{FmiVersion, FmuPlatform, archive};
     offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n  \
     offbd export fmu --fmi 2.0 -o ball_on_plate.fmu\n  \
     offbd export fmu --library liboffbd_fmu.so --library offbd_fmu.dll -o both.fmu\n\n\
-    An FMU holds a shared library for each platform on which it runs. cargo builds\n\
-    the one for this platform, beside the program, where it is found.")]
+    An FMU holds a shared library for each platform on which it runs. The library\n\
+    for this platform is found beside the program, where cargo builds it, or where\n\
+    a release installs it.")]
 pub(crate) struct FmuArgs {
     /// The version of FMI: 3.0, or 2.0, which more simulators read
     #[arg(long, value_name = "VERSION", default_value_t = FmiVersion::V3)]
@@ -46,7 +47,7 @@ pub(super) fn run(args: &FmuArgs) -> anyhow::Result<()> {
     let rig = judge::load_rig(args.asset.as_deref())?;
     let name = rig.name.clone();
     let setup = judge::set_up(rig, None)?;
-    let own = if args.library.is_empty() { vec![beside_program()?] } else { Vec::new() };
+    let own = if args.library.is_empty() { vec![own_library()?] } else { Vec::new() };
     let libraries: Result<Vec<_>, InputError> =
         args.library.iter().chain(&own).map(|path| library(path)).collect();
     let fmu =
@@ -61,22 +62,22 @@ pub(super) fn run(args: &FmuArgs) -> anyhow::Result<()> {
     file.keep()
 }
 
-/// Returns the path of the library that was built with this program.
-fn beside_program() -> anyhow::Result<PathBuf> {
-    let path =
-        std::env::current_exe()?.with_file_name(format!("{DLL_PREFIX}offbd_fmu{DLL_SUFFIX}"));
-    if path.is_file() {
-        return Ok(path);
-    }
+/// Returns the path of the library that was built or installed with this program.
+fn own_library() -> anyhow::Result<PathBuf> {
+    let name = format!("{DLL_PREFIX}offbd_fmu{DLL_SUFFIX}");
+    let program = std::env::current_exe()?;
+    let installed = program.with_file_name("../lib/offbd").join(&name);
+    let built = program.with_file_name(name);
+    let found = [&built, &installed].into_iter().find(|path| path.is_file());
     let reason = "is missing, the library of the twin: build it with `cargo build --release \
                   --package offbd-fmu`, and name it with --library, unless it is beside offbd";
-    Err(InputError::file(&path, reason).into())
+    found.cloned().ok_or_else(|| InputError::file(&built, reason).into())
 }
 
 fn library(path: &Path) -> Result<(FmuPlatform, Vec<u8>), InputError> {
     let bytes = read(path)?;
     let platform = FmuPlatform::of_library(&bytes).ok_or_else(|| {
-        let reason = "is no shared library of Linux, macOS or Windows for x86_64 or aarch64";
+        let reason = "is not a shared library of Linux, macOS or Windows for x86_64 or aarch64";
         InputError::file(path, reason)
     })?;
     Ok((platform, bytes))

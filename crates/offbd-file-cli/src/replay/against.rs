@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::judge::JudgedSession;
 use offbd_terminal::table;
 use offbd_wire::difference::{ComparedTransition, ComparedView, TallyView, compare, count_changes};
+use offbd_wire::verdict::status_words;
 
 /// A JSON line for a transition of either verdict.
 #[derive(Serialize)]
@@ -95,7 +96,7 @@ fn cells(one: &ComparedTransition) -> [String; 6] {
     [
         word.to_owned(),
         format!("{}{kind}", view.code),
-        format!("{} {}", view.status, view.status_byte),
+        format!("{} {}", status_words(view.status.into()), view.status_byte),
         time(view.recorded_t_s),
         time(view.replayed_t_s),
         moved.map_or_else(String::new, |moved_s| format!("{moved_s:+.2}")),

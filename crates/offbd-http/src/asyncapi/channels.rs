@@ -138,7 +138,7 @@ pub(super) fn webhook_channel() -> Channel {
         name: "webhook".to_owned(),
         address: String::new(),
         server: "receiver",
-        summary: "Notifications of a channel, signed as Standard Webhooks say, posted to its URL",
+        summary: "Notifications of a channel, signed per Standard Webhooks, posted to its URL",
         bindings: Value::Null,
         operations: vec![Operation::new(Action::Send, &["notification"])],
     }

@@ -1,14 +1,14 @@
 //! Examples of bodies.
 //!
-//! All JSON bodies with the same schema have the same example. A page without an example shows
-//! the example of one item.
+//! All JSON bodies with the same schema have the same example. A page without an example, and a
+//! list, show the example of one item.
 
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use utoipa::openapi::example::ExampleBuilder;
 use utoipa::openapi::path::Operation;
-use utoipa::openapi::schema::Schema;
+use utoipa::openapi::schema::{Array, ArrayItems, Schema};
 use utoipa::openapi::{Components, Content, Ref, RefOr};
 
 use super::{PAGE_SUFFIX, SCHEMAS};
@@ -65,6 +65,10 @@ impl Examples {
     /// Refers to the example `name`, or to that of the schema of a JSON body.
     fn attach_to(&self, media_type: &str, content: &mut RefOr<Content>, name: Option<&str>) {
         let RefOr::T(content) = content else { return };
+        if let Some(item) = content.schema.as_ref().and_then(item_name) {
+            content.example = self.0.get(item).map(|example| json!([example]));
+            return;
+        }
         let of_schema = content.schema.as_ref().and_then(schema_name);
         let name = name.or_else(|| of_schema.filter(|_| media_type == "application/json"));
         if let Some((name, _)) = name.and_then(|name| self.0.get_key_value(name)) {
@@ -72,6 +76,14 @@ impl Examples {
             content.examples.insert("example".to_owned(), RefOr::Ref(reference));
         }
     }
+}
+
+/// Returns the name of the schema of the items, if `schema` is a list.
+fn item_name(schema: &RefOr<Schema>) -> Option<&str> {
+    let RefOr::T(Schema::Array(Array { items: ArrayItems::RefOrSchema(item), .. })) = schema else {
+        return None;
+    };
+    schema_name(item)
 }
 
 /// Returns the name of the schema to which `schema` refers, perhaps beside null.

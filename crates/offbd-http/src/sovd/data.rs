@@ -15,7 +15,8 @@ const VALUES: [(&str, &str, &str); 2] = [
     ("description", "Description of the rig, with its calibration", "identData"),
 ];
 
-/// Lists the values of a rig.
+/// Lists the values of a rig. There are two: the state of rig and twin, and the description of the
+/// rig with its calibration.
 #[utoipa::path(get, path = "/v1/components/{asset}/data", tag = "sovd",
     operation_id = "sovd_data_list",
     params(("asset" = String, description = "Name of the asset"), SchemaQuery),
@@ -37,7 +38,8 @@ pub(super) async fn list(
     Ok(answer(&SovdReferencesView { items }, "SovdReferences", &query))
 }
 
-/// Returns a value of a rig.
+/// Returns a value of a rig. `state` is the response of `/assets/{asset}/state`, and `description`
+/// the asset file.
 #[utoipa::path(get, path = "/v1/components/{asset}/data/{data}", tag = "sovd",
     operation_id = "sovd_data",
     params(("asset" = String, description = "Name of the asset"),

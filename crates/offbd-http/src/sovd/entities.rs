@@ -8,14 +8,15 @@ use super::{AssetPath, BASE, Problem, Query, SchemaQuery, answer};
 use crate::MAX_PAGE;
 use offbd_service::Service;
 use offbd_wire::sovd::{
-    SovdComponentView, SovdInfoView, SovdReferenceView, SovdReferencesView, SovdVendorView,
-    SovdVersionView,
+    SovdComponentView, SovdInfoView, SovdReferenceView, SovdReferencesView, SovdRootView,
+    SovdVendorView, SovdVersionView,
 };
 
 /// Version of the standard whose shapes the adapter has.
 const VERSION: &str = "1.1.0";
 
-/// Returns the versions of SOVD that the service speaks, and the path of the entities.
+/// Returns the versions of SOVD that the service speaks, and the path of the entities. Every
+/// client of SOVD begins here.
 #[utoipa::path(get, path = "/version-info", tag = "sovd", operation_id = "sovd_version_info",
     params(SchemaQuery), responses((status = 200, body = SovdInfoView)))]
 pub(super) async fn version_info(Query(query): Query<SchemaQuery>) -> Json<Value> {
@@ -26,7 +27,17 @@ pub(super) async fn version_info(Query(query): Query<SchemaQuery>) -> Json<Value
     answer(&SovdInfoView { sovd_info: vec![version] }, "SovdInfo", &query)
 }
 
-/// Lists the rigs, by name.
+/// Returns the path of the components, the only collection of entities. Every rig is a component;
+/// there are no areas, apps or functions.
+#[utoipa::path(get, path = "/v1", tag = "sovd", operation_id = "sovd_root",
+    params(SchemaQuery), responses((status = 200, body = SovdRootView)))]
+pub(super) async fn root(Query(query): Query<SchemaQuery>) -> Json<Value> {
+    let components = format!("{BASE}/components");
+    let view = SovdRootView { id: "offbd".to_owned(), name: "offbd".to_owned(), components };
+    answer(&view, "SovdRoot", &query)
+}
+
+/// Lists the rigs, by name. All are in one response, because the standard has no pages.
 #[utoipa::path(get, path = "/v1/components", tag = "sovd", operation_id = "sovd_components",
     params(SchemaQuery), responses((status = 200, body = SovdReferencesView)))]
 pub(super) async fn components(
@@ -51,7 +62,7 @@ pub(super) async fn components(
     }
 }
 
-/// Returns a rig: the paths of what there is of it.
+/// Returns a rig: the paths of what there is of it. They lead to its faults, data and bulk data.
 #[utoipa::path(get, path = "/v1/components/{asset}", tag = "sovd",
     operation_id = "sovd_component",
     params(("asset" = String, description = "Name of the asset"), SchemaQuery),

@@ -45,7 +45,7 @@ fn status_pairs(query: Option<&str>) -> Result<Vec<(String, String)>, Invalid> {
         let key = rest.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         let key = key.ok_or_else(|| Invalid::new("?status", "is not of the form status[KEY]"))?;
         if SovdStatusView::default().matches(key, &value).is_none() {
-            let reason = "is no key of the status, or its value is not 0, 1, true or false";
+            let reason = "is not a key of the status, or its value is not 0, 1, true or false";
             return Err(Invalid::new(format!("?status[{key}]"), reason));
         }
         pairs.push((key.to_owned(), value.into_owned()));
@@ -60,6 +60,7 @@ fn has_status(fault: &SovdFaultView, pairs: &[(String, String)]) -> bool {
 }
 
 /// Lists the faults of a rig that are on record; with `status`, also those that were cleared.
+/// `severity` and `scope` select further; several `status` are alternatives.
 #[utoipa::path(get, path = "/v1/components/{asset}/faults", tag = "sovd",
     operation_id = "sovd_faults",
     params(("asset" = String, description = "Name of the asset"), FaultsQuery, SchemaQuery,
@@ -122,7 +123,8 @@ async fn recording(
     }))
 }
 
-/// Returns a fault with the environment in which it occurred.
+/// Returns a fault with the environment in which it occurred. The environment is the freeze frame,
+/// counters and times, and the path of the recording.
 #[utoipa::path(get, path = "/v1/components/{asset}/faults/{code}", tag = "sovd",
     operation_id = "sovd_fault",
     params(("asset" = String, description = "Name of the asset"),
@@ -140,7 +142,7 @@ pub(super) async fn get(
     Ok(answer(&fault_detail(entry, extended, snapshots, recording), "SovdFaultDetail", &query))
 }
 
-/// Clears a fault: erases its record.
+/// Clears a fault: erases its record. The recordings and the history are kept.
 #[utoipa::path(delete, path = "/v1/components/{asset}/faults/{code}", tag = "sovd",
     operation_id = "sovd_clear_fault",
     params(("asset" = String, description = "Name of the asset"),
@@ -155,7 +157,7 @@ pub(super) async fn clear(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Clears all faults of a rig.
+/// Clears all faults of a rig. The recordings and the history are kept.
 #[utoipa::path(delete, path = "/v1/components/{asset}/faults", tag = "sovd",
     operation_id = "sovd_clear_faults",
     params(("asset" = String, description = "Name of the asset")),

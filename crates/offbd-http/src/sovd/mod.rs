@@ -37,6 +37,7 @@ pub(super) fn routes() -> GuardedRouter {
     use Right::{Operate, Public, Read, ReadAsset};
     GuardedRouter::new(Document::default())
         .routes(Public, routes!(entities::version_info))
+        .routes(Read, routes!(entities::root))
         .routes(Read, routes!(entities::components))
         .routes(ReadAsset, routes!(entities::component))
         .routes(ReadAsset, routes!(faults::list))

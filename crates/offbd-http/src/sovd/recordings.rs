@@ -20,7 +20,7 @@ pub(super) fn path(asset: &str) -> String {
     format!("{BASE}/components/{asset}/bulk-data/recordings")
 }
 
-/// Lists the categories of bulk data of a rig: its recordings.
+/// Lists the categories of bulk data of a rig: its recordings. There is one category.
 #[utoipa::path(get, path = "/v1/components/{asset}/bulk-data", tag = "sovd",
     operation_id = "sovd_bulk_data",
     params(("asset" = String, description = "Name of the asset"), SchemaQuery),

@@ -49,12 +49,12 @@ macro_rules! file {
 const ENTRIES: [CatalogueEntry; 12] = [
     CatalogueEntry {
         name: "tilt",
-        about: "steps 48-50: both angles pi/20 from rest; leaves by the near side, y, and falls",
+        about: "the plate tilts by pi/20 on both axes; the ball rolls off and falls",
         what: EntryContent::Laws(&[file!("tilt")]),
     },
     CatalogueEntry {
         name: "pid",
-        about: "application 1: two PID loops every 10 ms bring the ball to the centre, 30 s",
+        about: "two PID loops every 10 ms bring the ball to the centre, 30 s",
         what: EntryContent::Control(false),
     },
     CatalogueEntry {
@@ -64,17 +64,17 @@ const ENTRIES: [CatalogueEntry; 12] = [
     },
     CatalogueEntry {
         name: "block",
-        about: "application 2: a cube, which friction holds at pi/20 on both axes, beside the ball",
+        about: "tilt with a cube beside the ball, which friction holds",
         what: EntryContent::Fine(1e-7, &[file!("block"), file!("tilt")]),
     },
     CatalogueEntry {
         name: "good-asset",
-        about: "application 3: a rig and its twin side by side; nothing is reported",
+        about: "a rig and its twin side by side; nothing is reported",
         what: EntryContent::Rig(false),
     },
     CatalogueEntry {
         name: "bad-x-servo",
-        about: "application 3: its x servo obeys 0.5 s late; x_servo is reported",
+        about: "the same, but its x servo obeys 0.5 s late; x_servo is reported",
         what: EntryContent::Rig(true),
     },
     CatalogueEntry {

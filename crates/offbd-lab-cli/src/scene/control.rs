@@ -136,7 +136,7 @@ fn back(answer: &ControlResult) -> String {
             format!("yes: within 2 cm of the centre by 17 s, from {t:.2} s on")
         }
         (Some(false), _) => "no: beyond 2 cm of the centre after 17 s".to_owned(),
-        (None, _) => "the run did not come to 17 s".to_owned(),
+        (None, _) => "the run ended before 17 s".to_owned(),
     }
 }
 

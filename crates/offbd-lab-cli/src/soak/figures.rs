@@ -84,7 +84,7 @@ fn figures(found: &SoakCounts) -> Option<comfy_table::Table> {
     row("rigs with one", found.n_rigs_alarmed.to_string());
     row("sessions with one", listed(&found.confirmed));
     row("false alarms per rig-year", per_year(found));
-    row("sessions with pending only", listed(&found.pending));
+    row("sessions with suspicions only", listed(&found.pending));
     Some(figures)
 }
 

@@ -34,7 +34,7 @@ impl StepControl {
             if error.is_finite() { SAFETY * error.max(1e-10).powf(-1.0 / self.power) } else { 0.0 };
         let change = change.clamp(1.0 / LARGEST_CHANGE, LARGEST_CHANGE);
         let accepted = error <= 1.0 || tried <= self.shortest;
-        // A step that the end of its piece has shortened is no reason to shorten the next.
+        // A step that the end of its piece has shortened is not a reason to shorten the next.
         let next =
             if accepted && tried < self.h { self.h.max(tried * change) } else { tried * change };
         self.h = next.clamp(self.shortest, self.longest);

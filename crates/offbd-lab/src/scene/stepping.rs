@@ -15,7 +15,7 @@ pub(super) const MOST_CHANGES: u32 = 100_000;
 /// Why a run ended early.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
-    #[error("the state is no number any more at {at_s:.6} s: the step is too long for this method")]
+    #[error("at {at_s:.6} s the state is not a number: the step is too long for this method")]
     NotFinite { at_s: f64 },
     #[error("too many steps at {at_s:.6} s")]
     TooManySteps { at_s: f64 },

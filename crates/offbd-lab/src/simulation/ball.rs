@@ -84,9 +84,9 @@ impl BallOnPlate {
         self.at_the_edge(after)
     }
 
-    /// Brakes the spin about the normal as rolling is braked: by a couple of the weight
-    /// times the lever of the contact force, rolling_rad·r. Without it the spin of a ball
-    /// that circles would grow without bound.
+    /// Slows the spin about the normal as rolling resistance slows rolling: by the torque
+    /// weight × rolling_rad·r, the lever of the contact force. Otherwise the spin of a ball that
+    /// circles would grow without bound.
     fn spun_down(&self, state: RollingState, fault: Option<BallFault>, h: f64) -> RollingState {
         let kappa = self.ball.inertia_factor();
         let couple = self.resistance(self.surface.rolling_rad, fault) * (1.0 + kappa);

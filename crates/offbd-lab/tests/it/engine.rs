@@ -74,10 +74,10 @@ fn healthy_rigs_are_silent() {
     }
 }
 
-/// A badly tuned controller makes the ball travel more, because it oscillates. That is no fault of
-/// the rig, which obeys it, and none is found as long as the ball stays off the rim.
+/// A badly tuned controller makes the ball travel more, because it oscillates. That is not a fault
+/// of the rig, which obeys it, and none is found as long as the ball stays off the rim.
 #[test]
-fn a_ball_that_oscillates_because_of_its_controller_is_no_fault() {
+fn a_ball_that_oscillates_because_of_its_controller_is_not_a_fault() {
     let model = Preset::Chapter.model().unwrap();
     let (setup, usual) = (learnt(Preset::Chapter), model.gains());
     let run = |gains: PidGains, seed: u64| {
@@ -104,10 +104,10 @@ fn a_ball_that_oscillates_because_of_its_controller_is_no_fault() {
     }
 }
 
-/// A controller that makes the ball beat against the rim is no fault of the rig either: what
+/// A controller that makes the ball beat against the rim is not a fault of the rig either: what
 /// comes before and after a bounce is not one path.
 #[test]
-fn bounces_off_the_rim_are_no_fault() {
+fn bounces_off_the_rim_are_not_a_fault() {
     let mut n_bounced = 0;
     for preset in [Preset::Chapter, Preset::Pingpong] {
         let model = preset.model().unwrap();
@@ -189,7 +189,7 @@ fn nothing_is_differenced_across_a_gap() {
 /// A single outlier after a gap in which the ball could have moved as far: the gate first
 /// accepts it, and then revokes it.
 #[test]
-fn an_outlier_that_could_be_the_ball_is_no_noise() {
+fn an_outlier_that_could_be_the_ball_is_not_noise() {
     let setup = learnt(Preset::Chapter);
     let mut samples = session(Preset::Chapter, Reference::Circle, 90.0, 8, "");
     let mut blinked = false;

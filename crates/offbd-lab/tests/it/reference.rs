@@ -347,7 +347,7 @@ fn validate_one_pass_where_rolling_is_an_illusion() {
 fn one_pass_declines_what_rounding_forbids() {
     let (scene, laws) = scene("steep");
     let declined = one_pass(&scene, &mut laws.clone(), 1e-12, None).unwrap_err().to_string();
-    assert!(declined.starts_with("no model keeps 1e-12 m here: "), "{declined}");
+    assert!(declined.starts_with("no model stays within 1e-12 m here: "), "{declined}");
 }
 
 #[test]

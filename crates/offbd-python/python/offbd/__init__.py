@@ -6,10 +6,9 @@ to its service. All quantities are in SI units: `t_s` in s, angles in rad, posit
 A *recording* is the path of a session file, in any format that the program reads; or anything
 with the Arrow PyCapsule interface (pandas, polars, pyarrow, DuckDB); or a mapping from column
 names to NumPy arrays or lists. The columns of a table are `t_s`, `cmd_qx_rad`, `cmd_qy_rad`,
-`x_m`, `y_m` and optionally `seq`; null and NaN are missing values. Those of a text or a sheet may
-have other names and units: the argument `columns` says which is which, such as
-"t_s=time/ms, x_m=ball_x/mm", or else `columns` of the asset; `rate_hz` is the number of rows a
-second of a text without a time.
+`x_m`, `y_m` and optionally `seq`; null and NaN are missing values. They may have other names and
+units: the argument `columns` says which is which, such as "t_s=time/ms, x_m=ball_x/mm", or else
+`columns` of the asset; `rate_hz` is the number of rows a second of a recording without a time.
 
 An *asset* is the description of a rig: the path of an asset file, a `dict`, or JSON text.
 Without one, the rig is that of the book chapter which offbd grew out of.
@@ -98,18 +97,18 @@ class SceneRun:
 
 
 def read(
-    path: str | PathLike[str],
+    recording: Any,
     asset: Asset | None = None,
     *,
     columns: str | None = None,
     rate_hz: float | None = None,
 ) -> list[Table]:
-    """Reads a session file; returns a table for each run. A file has one run unless the clock
-    of a text starts again. Warns if rows are rejected.
+    """Reads a recording; returns a table for each run. A recording has one run unless its clock
+    starts again. Warns if rows are rejected.
 
     Raises OSError if the file cannot be read, and ValueError if it is not a recording.
     """
-    return _offbd.read(path, _asset_text(asset), columns, rate_hz)
+    return _offbd.read(recording, _asset_text(asset), columns, rate_hz)
 
 
 def replay(

@@ -1,6 +1,5 @@
 """The native part. Use the functions of the package `offbd`, which describe it."""
 
-from os import PathLike
 from typing import Any, final
 
 __all__ = [
@@ -62,7 +61,7 @@ def calibrate(
     rate_hz: float | None,
 ) -> str: ...
 def read(
-    path: str | PathLike[str],
+    recording: object,
     asset_file: str | None,
     columns: str | None,
     rate_hz: float | None,

@@ -44,8 +44,8 @@ MAX_EXCERPT = 200
 
 FaultFilter: TypeAlias = Literal["active", "pending", "confirmed", "healed", "cleared", "all"]
 """Selects faults by status; active means pending or confirmed."""
-AlarmFilter: TypeAlias = Literal["failing", "on_record", "active", "all"]
-"""Selects alarms; active means failing or on record."""
+AlarmFilter: TypeAlias = Literal["failing", "suspected", "on_record", "active", "all"]
+"""Selects alarms; active means failing, suspected or on record."""
 
 _log = logging.getLogger("offbd")
 
@@ -265,7 +265,7 @@ class Client:
         self, asset: str | None = None, *, state: AlarmFilter = "active"
     ) -> Iterator[doc.Alarm]:
         """Yields the alarms of an asset, or of all: faults that fail or are on record, and rigs
-        whose data stay away. `state` is failing, on_record, active or all.
+        without data during a session. `state` is failing, on_record, active or all.
         """
         return self._items("/alarms", {"asset": asset, "state": state})
 

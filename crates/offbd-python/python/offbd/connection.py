@@ -74,7 +74,7 @@ class Connection:
 
     @contextmanager
     def stream(self, request: Request) -> Iterator[http.client.HTTPResponse]:
-        """Sends a request on a connection of its own; yields its answer, which may not end."""
+        """Sends a request on its own connection; yields its answer, which may not end."""
         connection = self._connect()
         try:
             self._request(connection, request)

@@ -162,11 +162,11 @@ class AxisCalibration(TypedDict):
     """
     Largest evidence against the servo while it was healthy, in [0, 1000] nats.
     """
-    most_path_error_m: NotRequired[float]
+    most_path_nats: NotRequired[float | None]
     """
-    Largest root mean square deviation of the path from the twin's over two seconds that
-    is expected of a healthy servo, in [0, 1] m: the largest of the tests, plus a margin
-    if they were few. If 0, it is unknown and paths are not judged.
+    Largest evidence of the path against the servo while it was healthy, in [0, 1000]
+    nats. If absent, it is unknown, and the path alone does not accuse the servo: calibrate
+    the rig again.
     """
     noise_m: float
     """
@@ -218,14 +218,15 @@ class AxisEvidence(TypedDict):
     Evidence for a fault of the servo: natural logarithm of the likelihood ratio of a
     broken and a healthy servo, nats.
     """
-    path_error_m: NotRequired[float | None]
+    path_limit_nats: NotRequired[float | None]
     """
-    Path error: root mean square deviation of the path of the last two seconds from the
-    twin's, apart from a parabola with one kink, m; null if it cannot be tested.
+    Evidence of the path from which on the servo fails, nats; null if unknown.
     """
-    path_limit_m: NotRequired[float | None]
+    path_nats: NotRequired[float | None]
     """
-    Largest path error expected of a healthy rig, m; null if unknown.
+    Evidence of the path of the last seconds for a fault of the servo, nats, in which the
+    scale of the twin's error is the session's own; negative if the path speaks for a
+    healthy servo, null if it cannot be tested.
     """
     position_m: NotRequired[float | None]
     """
@@ -441,6 +442,8 @@ Misfit: TypeAlias = Literal[
     "one_axis",
     "swapped",
     "wrong_sign",
+    "scale",
+    "no_room",
 ]
 """
 A contradiction between data and asset file.
@@ -489,10 +492,30 @@ class Mute(TypedDict):
     no token.
     """
     code: AlarmCode
+    etag: str
+    """
+    Entity tag of the mute, for `If-Match`.
+    """
     reason: str
     until: str
     """
     Time at which the mute ends by itself, RFC 3339.
+    """
+
+
+class NamedKind(TypedDict):
+    """
+    A failure mode that a confirmed fault was given.
+    """
+
+    kind: FaultKind
+    t_s: float
+    """
+    Time at which it was first named, s on the device's clock.
+    """
+    weight: NotRequired[float | None]
+    """
+    Its weight among the candidates at that time, in (0, 1]; null if unknown.
     """
 
 
@@ -503,7 +526,7 @@ class Occurrence(TypedDict):
 
     calibration_id: NotRequired[str | None]
     """
-    Id of the calibration that was used; null if the rig was not learnt.
+    Id of the calibration that was used; null if the rig was not calibrated.
     """
     noted_at: str
     """
@@ -1096,7 +1119,7 @@ class Evidence(TypedDict):
     healthy_scatter_m: NotRequired[float]
     """
     Standard deviation of healthy readings, the larger of both axes, m: learnt, or assumed
-    if the rig is not learnt.
+    if the rig is not calibrated.
     """
     identical_s: float
     """
@@ -1144,7 +1167,7 @@ class Fault(TypedDict):
     axis: NotRequired[Axis | None]
     calibration_id: NotRequired[str | None]
     """
-    Id of the calibration that was used; null if the rig was not learnt.
+    Id of the calibration that was used; null if the rig was not calibrated.
     """
     candidates: list[Candidate]
     """
@@ -1413,6 +1436,11 @@ class Judged(TypedDict):
     judged_share: float
     """
     That time as a fraction of the session from its first to its last sample, 0 to 1.
+    """
+    kinds: NotRequired[list[NamedKind]]
+    """
+    The failure modes of its confirmed fault, each with the time at which it was first named;
+    absent if there are none, or if an earlier version stored the summary without them.
     """
     outcome: Outcome
 
@@ -1724,6 +1752,11 @@ class Alarm(TypedDict):
     Time at which the record last changed, RFC 3339.
     """
     code: AlarmCode
+    communication_lost_since: str | None
+    """
+    Time at which the last data of the rig arrived, RFC 3339, if data have stopped during an open
+    session; null otherwise. What failed then is not known to fail now.
+    """
     evidence: AlarmEvidence
     failing: bool
     """
@@ -1878,6 +1911,11 @@ class FaultEntry(FaultRecord, Provenance):
     """
     Time at which the record last changed, RFC 3339.
     """
+    communication_lost_since: NotRequired[str | None]
+    """
+    Time at which the last data of the asset arrived, RFC 3339, if data have stopped during an
+    open session; null otherwise, and in lists of several assets.
+    """
     monitor: NotRequired[Monitor | None]
     session_open: NotRequired[bool | None]
     """
@@ -1908,7 +1946,7 @@ class ReplayResult(TypedDict):
 
     calibration_id: NotRequired[str | None]
     """
-    Id of the calibration used by the replay; null if the rig was not learnt.
+    Id of the calibration used by the replay; null if the rig was not calibrated.
     """
     differences: list[Difference]
     """

@@ -21,7 +21,7 @@ MAX_SHOWN = 20
 
 @dataclass(frozen=True)
 class RejectedRow:
-    """A row that is no sample."""
+    """A row that is not a sample."""
 
     row: int
     """Number of the row, from 1; in a file of text that of the line."""

@@ -27,7 +27,7 @@ pub(crate) struct Asset {
     pub(super) open: Option<Box<OpenSession>>,
     pub(super) session_rate: SessionRate,
     pub(super) link: LinkHealth,
-    /// Rows of the batch that is being recorded that are no samples, and that the engine has
+    /// Rows of the batch that is being recorded that are not samples, and that the engine has
     /// not been told of yet.
     pub(super) malformed: Vec<usize>,
     /// When the last batch arrived.

@@ -37,6 +37,7 @@ impl Asset {
             let what = "a recording is being imported into this asset";
             return Err(ServiceError::Busy { what });
         }
+        self.link.unknown(batch.unknown, turn.at);
         let last_t_s = samples.last().map(|(_, last)| last.t_s);
         if !samples.is_empty() {
             match batch.session {
@@ -72,7 +73,7 @@ impl Asset {
     }
 
     /// Notes the arrival of a batch whose last sample has the time `last_t_s`, with `n_malformed`
-    /// rows that are no samples.
+    /// rows that are not samples.
     fn note_presence(&mut self, last_t_s: Option<f64>, n_malformed: usize, turn: &Turn<'_>) {
         let (presences, name) = (&turn.env.presences, &self.row.name);
         let open = self.open.as_ref().map(|open| (&*open.id, open.judging.engine().unjudged()));
@@ -125,7 +126,7 @@ impl Asset {
     }
 
     /// Records samples without a session name: in the open session, or in a new one if
-    /// none is open or the device has started anew.
+    /// none is open or the device has restarted.
     fn record_nameless(
         &mut self,
         samples: Vec<(usize, Sample)>,
@@ -250,7 +251,7 @@ impl Asset {
     }
 }
 
-/// Tells the engine of the rows before `index` that are no samples.
+/// Tells the engine of the rows before `index` that are not samples.
 fn note_malformed(malformed: &mut Vec<usize>, index: usize, open: &mut OpenSession) {
     let n = malformed.partition_point(|&malformed| malformed < index);
     for _ in malformed.drain(..n) {

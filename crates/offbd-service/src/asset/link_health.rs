@@ -1,13 +1,16 @@
 //! How the samples of an asset arrive: rate, spacing, gaps, delay, duplicates and rows that are
 //! not judged, since the session began and in the last minutes.
 //!
-//! Arithmetic over times that are passed in, in bounded memory. It is no part of an engine or
-//! of a verdict, is not stored, and begins anew when the asset is loaded.
+//! Arithmetic over times that are passed in, in bounded memory. It is not part of an engine or
+//! of a verdict, is not stored, and begins again when the asset is loaded.
+
+use std::ops::RangeInclusive;
 
 use super::link_tally::{LinkTally, Spread};
 use crate::clock::rfc3339;
 use offbd_store::Micros;
 use offbd_wire::link::LinkView;
+use offbd_wire::telemetry::UnknownKeyView;
 use offbd_wire::words::UnjudgedWord;
 
 /// Minutes of which the last ones consist, with the present one.
@@ -32,12 +35,14 @@ struct Counted {
     gap_s: Option<f64>,
     clock_offset_s: Option<f64>,
     whole: LinkTally,
+    /// The keys that are not understood of the last batch that has any, and when it arrived.
+    unknown: Option<Box<(Micros, Vec<UnknownKeyView>)>>,
     /// The tally of each of the last minutes, at the minute modulo their number.
     recent: [(Micros, LinkTally); RECENT_MINUTES],
 }
 
-/// The last samples, if the engine doubts their time until the next ones confirm it: after a gap,
-/// or a step of the clock.
+/// The last samples, while the engine doubts their times: after a gap or a step of the clock, until
+/// the next samples confirm them.
 #[derive(Clone, Copy, Debug)]
 struct DoubtedRun {
     first_t_s: f64,
@@ -70,7 +75,7 @@ impl Counted {
 
     /// The tallies that count what arrives at `at`: that of the session and that of the minute.
     fn tallies(&mut self, at: Micros) -> [&mut LinkTally; 2] {
-        let minute = at.div_euclid(MINUTE);
+        let minute = minute(at);
         let slot = &mut self.recent[minute.rem_euclid(RECENT_MINUTES as Micros) as usize];
         if slot.0 != minute {
             *slot = (minute, LinkTally::default());
@@ -89,12 +94,13 @@ impl LinkHealth {
     pub(super) fn follow(&mut self, session: &str, gap_s: f64, at: Micros) {
         let counted = self.counted(at);
         if counted.session != session {
-            let recent = counted.recent;
+            let (recent, unknown) = (counted.recent, counted.unknown.take());
             *counted = Counted {
                 session: session.to_owned(),
                 since: at,
                 gap_s: Some(gap_s),
                 recent,
+                unknown,
                 ..Counted::default()
             };
         }
@@ -153,6 +159,13 @@ impl LinkHealth {
         self.counted(at).tallies(at).into_iter().for_each(|tally| tally.unjudged(reason, n));
     }
 
+    /// Notes the keys of a batch that are not understood, if it has any.
+    pub(super) fn unknown(&mut self, keys: Vec<UnknownKeyView>, at: Micros) {
+        if !keys.is_empty() {
+            self.counted(at).unknown = Some(Box::new((at, keys)));
+        }
+    }
+
     /// Returns the view of `asset`, whose file states the rate `expected_rate_hz`, at `now`.
     pub(super) fn view(&self, asset: &str, expected_rate_hz: f64, now: Micros) -> LinkView {
         let counted = self.0.as_deref();
@@ -168,18 +181,35 @@ impl LinkHealth {
                 let (first, recent) = recent(counted, now)?;
                 Some(recent.view(rfc3339(first * MINUTE)))
             }),
+            unknown: counted.map(|counted| unknown(counted, now)).unwrap_or_default(),
         }
     }
+}
+
+/// Returns the keys that are not understood of the last batch that has any, if it arrived in the last
+/// minutes at `now`.
+fn unknown(counted: &Counted, now: Micros) -> Vec<UnknownKeyView> {
+    let recent = counted.unknown.as_deref().filter(|(at, _)| minutes(now).contains(&minute(*at)));
+    recent.map(|(_, keys)| keys.clone()).unwrap_or_default()
+}
+
+const fn minute(at: Micros) -> Micros {
+    at.div_euclid(MINUTE)
+}
+
+/// The last minutes at `now`.
+const fn minutes(now: Micros) -> RangeInclusive<Micros> {
+    let last = minute(now);
+    last - (RECENT_MINUTES as Micros - 1)..=last
 }
 
 /// Returns the tally of the last minutes at `now`, and the first of them; `None` if nothing has
 /// arrived. Minutes of a clock that has been set back since are left out.
 fn recent(counted: &Counted, now: Micros) -> Option<(Micros, LinkTally)> {
-    let last = now.div_euclid(MINUTE);
-    let first = last - (RECENT_MINUTES as Micros - 1);
-    let minutes = counted.recent.iter().filter(|(minute, _)| (first..=last).contains(minute));
-    let sum = minutes.fold(LinkTally::default(), |sum, (_, tally)| sum.plus(tally));
-    (sum != LinkTally::default()).then_some((first, sum))
+    let last = minutes(now);
+    let found = counted.recent.iter().filter(|(minute, _)| last.contains(minute));
+    let sum = found.fold(LinkTally::default(), |sum, (_, tally)| sum.plus(tally));
+    (sum != LinkTally::default()).then_some((*last.start(), sum))
 }
 
 #[cfg(test)]
@@ -233,6 +263,20 @@ mod tests {
         health.sample(301.0, at(-3600.0));
         assert_eq!(samples(&health, -3600.0), Some(1));
         assert_eq!(health.view("a", 100.0, at(0.0)).session.unwrap().samples, 3);
+    }
+
+    #[test]
+    fn keys_that_are_not_understood_are_told_for_some_minutes() {
+        let key = |key: &str| UnknownKeyView { key: key.to_owned(), meant: None };
+        let mut health = counted(&[(0.0, 0.0)]);
+        health.unknown(vec![key("ball")], at(0.0));
+        health.unknown(Vec::new(), at(1.0));
+        health.follow("other", 0.3, at(2.0));
+        let told = |health: &LinkHealth, s| health.view("a", 100.0, at(s)).unknown;
+        assert_eq!(told(&health, 2.0), [key("ball")]);
+        assert_eq!(told(&health, 600.0), []);
+        health.unknown(vec![key("plate")], at(3.0));
+        assert_eq!(told(&health, 4.0), [key("plate")]);
     }
 
     #[test]

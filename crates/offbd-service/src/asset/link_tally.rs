@@ -36,7 +36,7 @@ impl LinkTally {
         }
     }
 
-    /// Counts times between samples that are no gaps.
+    /// Counts times between samples that are not gaps.
     pub(super) fn spacings(&mut self, spacing: &Spread) {
         self.spacing = self.spacing.plus(spacing);
     }

@@ -11,7 +11,7 @@
 //! - `ingest`, `outcomes`, `sessions`, `session`, `part`, `parts`, `recent`: samples, sessions,
 //!   the engine of a session.
 //! - `recorded`, `restart`, `ended_session`, `sent_before`: which samples are there already, and when a device
-//!   has started anew.
+//!   has restarted.
 //! - `memory`, `trend`: the fault memory, servo estimates over the sessions.
 //! - `learning`, `learning_record`: automatic calibration.
 //! - `registry`, `presence`: the asset file, the time of the last telemetry.

@@ -22,7 +22,7 @@ pub(crate) struct Presence {
     pub(crate) lag_s: Option<f64>,
     /// The unjudged samples, if the rig counts as not tested.
     pub(crate) unjudged: Option<Unjudged>,
-    /// Rows that were no samples, while no session was open.
+    /// Rows that were not samples, while no session was open.
     n_malformed: u64,
     /// Smallest difference of arrival time and device clock in the session, s; it grows with time
     /// as that of a clock which is slow.

@@ -1,4 +1,4 @@
-//! Detects that a device without session names has started anew.
+//! Detects that a device without session names has restarted.
 
 use super::recorded::RecordedSamples;
 use super::session::OpenSession;
@@ -18,7 +18,7 @@ pub(super) const CERTAIN_AFTER: u32 = 2;
 enum Sign {
     /// It continues the session.
     Continues,
-    /// It is recorded already: a retransmission, or a device that starts anew with the
+    /// It is recorded already: a retransmission, or a device that restarts with the
     /// values it had before.
     Repeats,
     /// It is not part of the session.
@@ -27,8 +27,8 @@ enum Sign {
 
 impl OpenSession {
     /// Returns how many of the first `samples` belong to this session; the device has
-    /// started anew before the others. A device starts anew if samples have the keys of
-    /// recorded ones and other values, or if its clock goes back to times that are no gap
+    /// restarted before the others. A device has restarted if samples have the keys of
+    /// recorded ones and other values, or if its clock goes back to times that are not a gap
     /// of the recording.
     pub(super) fn continued_by(
         &mut self,
@@ -72,7 +72,7 @@ impl OpenSession {
         let is_far_behind = sample.t_s < latest_s - RESTART_S;
         match recorded.recognise(engine.recognise(sample), sample) {
             Recognition::Conflict => Sign::StartsAnew,
-            // It was sent late, before the device can have started anew.
+            // It was sent late, before the device can have restarted.
             Recognition::Same if engine.precedes(sample) => Sign::Continues,
             Recognition::Same => Sign::Repeats,
             Recognition::New if is_far_behind && !self.is_beyond(sample, latest_s) => {

@@ -76,7 +76,7 @@ impl OpenSession {
         self.note(sample, admission)
     }
 
-    /// Evaluates one sample that is no retransmission.
+    /// Evaluates one sample that is not a retransmission.
     pub(super) fn take_new(&mut self, sample: &Sample) -> Admission {
         let admission = self.judging.new_sample(*sample);
         self.note(sample, admission)

@@ -36,7 +36,7 @@ impl SessionRate {
 
     fn left_at(&self, at: Micros) -> f64 {
         match self.at {
-            // How much time has passed is not known, and must not be waited for.
+            // Nobody knows how much time has passed: nothing waits for it.
             Some(before) if at < before => BURST,
             Some(before) => (self.left + (at - before) as f64 / 1e6 * PER_S).min(BURST),
             None => self.left,

@@ -324,7 +324,7 @@ mod tests {
                 Event::Resume(node) => self.nodes[node].is_paused = false,
                 Event::Disconnect(node) => self.database.end(node),
                 Event::Kill(node) => {
-                    // The process starts anew under the same name; ids are not reused, but the
+                    // The process restarts under the same name; ids are not reused, but the
                     // model's nodes own nothing after a start, which is what counts.
                     let session = self.database.connect(node);
                     self.nodes[node] = Node::new(node, session);

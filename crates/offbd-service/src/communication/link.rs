@@ -29,7 +29,7 @@ pub(super) enum LinkChange {
 /// What is known of the link of one rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Link {
-    /// Arrival of the last data or, before any, the time from which they are waited for.
+    /// Arrival of the last data or, before any, the time from which the link waits for them.
     pub(super) seen_at: Micros,
     is_lost: bool,
     /// Arrival of the first data of the present run, while the link is lost.
@@ -37,7 +37,7 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// A link of which data are waited for from `now` on.
+    /// A link that waits for data from `now` on.
     pub(super) const fn new(now: Micros, is_lost: bool) -> Self {
         Self { seen_at: now, is_lost, arriving_since: None }
     }
@@ -47,7 +47,7 @@ impl Link {
         self.is_lost
     }
 
-    /// Waits anew from `now` on, because the clock has jumped or the process has slept.
+    /// Waits again from `now` on, because the clock has jumped or the process has slept.
     pub(super) fn wait_from(&mut self, now: Micros) {
         self.seen_at = self.seen_at.max(now);
     }
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(changes(500, |s| s % 29 == 0), []);
     }
 
-    /// A batch now and then does not bring a link back, and is no new loss.
+    /// A batch now and then does not bring a link back, and is not a new loss.
     #[test]
     fn flapping_is_one_loss() {
         let found = changes(1000, |s| s < 10 || s % 40 == 0 || s > 800);
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_of_the_clock_is_no_silence() {
+    fn a_jump_of_the_clock_is_not_silence() {
         let settings = CommunicationSettings::default();
         let mut link = Link::new(0, false);
         assert_eq!(link.advance(SECOND, Some(SECOND), &settings), None);

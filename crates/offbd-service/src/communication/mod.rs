@@ -1,7 +1,7 @@
 //! Finds rigs whose data stay away although their session is open. This is a condition of the
 //! service, by its wall clock; no engine knows it, and no verdict depends on it.
 //!
-//! A rig is waited for while it has an open session with samples. A session that is ended, by
+//! The service waits for a rig that has an open session with samples. A session that is ended, by
 //! its device or a person, says that no more data are to come.
 
 mod link;
@@ -81,7 +81,7 @@ impl CommunicationWatch {
         let open = store.open_links(self.handles.ownership.filter().as_deref()).await?;
         let lost = store.lost_communications(None).await?;
         let was_lost: BTreeMap<_, _> = lost.into_iter().map(|row| (row.asset, row.since)).collect();
-        self.wait_anew_after_jump(now);
+        self.restart_waits_after_jump(now);
         let mut changes = Vec::new();
         let ownership = &self.handles.ownership;
         for rig in open.iter().filter(|rig| ownership.owns(&rig.asset)) {
@@ -129,7 +129,7 @@ impl CommunicationWatch {
         Ok(())
     }
 
-    fn wait_anew_after_jump(&mut self, now: Micros) {
+    fn restart_waits_after_jump(&mut self, now: Micros) {
         let elapsed = self.last_look.map_or(0, |last| now - last);
         if !(0..micros(JUMP)).contains(&elapsed) {
             self.links.values_mut().for_each(|link| link.wait_from(now));

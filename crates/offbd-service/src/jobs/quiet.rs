@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_calibration_that_begins_without_a_queue_is_held_back_anew() {
+    async fn a_calibration_that_begins_without_a_queue_is_held_back_again() {
         let in_flight = Arc::new(Semaphore::new(1000));
         let quiet = Quiet::new(in_flight.clone(), 1000);
         quiet.held.0.store(MAX_HELD, Ordering::Relaxed);

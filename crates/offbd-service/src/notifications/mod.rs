@@ -9,7 +9,7 @@
 //!    failed attempt is repeated after growing delays (`retry`). A message may arrive twice,
 //!    if the process is killed before the outcome is stored.
 //! 3. **Reminders** (`reminders`): a rule may repeat a message as long as a fault fails and
-//!    nobody has acknowledged it.
+//!    nobody has acknowledged it, or delay the first one until the fault has failed for some time.
 //!
 //! Nothing of this is on the way of a batch: events are read from the store, and a channel
 //! that hangs delays only its own messages. How messages travel is the business of a

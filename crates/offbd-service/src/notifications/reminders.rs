@@ -1,6 +1,7 @@
-//! Repeats the message of a fault that still fails and that nobody has acknowledged.
+//! Repeats the message of a fault that still fails and that nobody has acknowledged, and sends the
+//! first message of one that has failed for the delay of its rule.
 
-use super::planner::{Rules, delivery};
+use super::planner::{NOT_TOLD, Rules, delivery};
 use super::rules::ActiveRule;
 use super::{Context, NotificationTransport, planner};
 use crate::clock::rfc3339;
@@ -38,8 +39,10 @@ impl<T: NotificationTransport> Context<T> {
         now: Micros,
     ) -> Result<Vec<Write>, ServiceError> {
         let code: Option<AlarmCodeWord> = row.code.parse().ok();
-        let wanted = found.and_then(|(rule, channel)| Some((rule, channel, rule.repeat()?, code?)));
-        let Some((rule, channel, repeat, code)) = wanted else { return Ok(vec![end(row)]) };
+        let is_first = row.n == NOT_TOLD;
+        let pause = |rule: &ActiveRule| if is_first { rule.delay() } else { rule.repeat() };
+        let wanted = found.and_then(|(rule, channel)| Some((rule, channel, pause(rule)?, code?)));
+        let Some((rule, channel, pause, code)) = wanted else { return Ok(vec![end(row)]) };
         let tags = self.handles.store.tags_of([row.asset.as_str()]).await?;
         if !rule.concerns(&row.asset, code, &tags) || !self.is_open(&row.asset, code).await? {
             return Ok(vec![end(row)]);
@@ -50,16 +53,21 @@ impl<T: NotificationTransport> Context<T> {
             return Ok(vec![put(later(until))]);
         }
         if self.mutes.of(&row.asset, code, now).is_some() {
-            return Ok(vec![put(later(now + repeat))]);
+            return Ok(vec![put(later(now + pause))]);
         }
         let first: NotificationView = views::from_json(&row.body)?;
         let n = row.n + 1;
-        let message = first.reminder(n, rfc3339(now));
+        let message = if is_first { first.clone() } else { first.reminder(n, rfc3339(now)) };
         let deliveries = vec![delivery(channel, (row.event, n), &row.asset, &message, now)];
         let plan =
             NotificationWrite::Plan { channel: channel.id.clone(), position: None, deliveries };
-        let next = ReminderRow { n, due_at: now + repeat, body: planner::body(&first), ..row };
-        Ok(vec![Write::Notification(plan), put(next)])
+        let next = match rule.repeat() {
+            Some(repeat) => {
+                put(ReminderRow { n, due_at: now + repeat, body: planner::body(&first), ..row })
+            }
+            None => end(row),
+        };
+        Ok(vec![Write::Notification(plan), next])
     }
 
     /// Whether the fault fails and nobody has acknowledged it.

@@ -56,6 +56,11 @@ impl ActiveRule {
         self.silent_until.filter(|until| *until > now)
     }
 
+    /// The time for which a fault must fail before its first message is sent, µs.
+    pub(super) fn delay(&self) -> Option<Micros> {
+        self.rule.delay_s.map(|s| Micros::from(s) * 1_000_000)
+    }
+
     /// The interval of reminders, µs.
     pub(super) fn repeat(&self) -> Option<Micros> {
         self.rule.repeat_s.map(|s| Micros::from(s) * 1_000_000)
@@ -136,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_test_that_passes_again_is_no_confirmation() {
+    fn a_test_that_passes_again_is_not_a_confirmation() {
         let change = |status: &str, byte: &str| {
             let event = json!({ "code": "x_servo", "status": status, "status_byte": byte });
             AlarmEvent::of(&event).unwrap().change

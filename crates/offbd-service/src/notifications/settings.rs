@@ -30,6 +30,9 @@ const MAX_PATTERN: usize = 200;
 /// Range of the interval of reminders, s.
 const REPEAT_S: std::ops::RangeInclusive<u32> = 60..=604_800;
 
+/// Range of the time for which a fault must fail before its first message is sent, s. Chosen.
+const DELAY_S: std::ops::RangeInclusive<u32> = 1..=86_400;
+
 /// Start of a secret, as Standard Webhooks say.
 const SECRET_PREFIX: &str = "whsec_";
 
@@ -69,7 +72,7 @@ fn webhook(
     before: Option<&StoredChannel>,
     targets: &TargetPolicy,
 ) -> Result<(StoredChannel, Option<String>), ServiceError> {
-    let NewWebhookView { url, secret } = new;
+    let NewWebhookView { url, secret, format } = new;
     text("/webhook/url", &url, MAX_URL)?;
     check_url(&url, targets).map_err(|reason| Invalid::new("/webhook/url", reason))?;
     let (secret, made) = match (secret, before) {
@@ -83,7 +86,7 @@ fn webhook(
             (secret.clone(), Some(secret))
         }
     };
-    Ok((StoredChannel::Webhook { url, secret }, made))
+    Ok((StoredChannel::Webhook { url, secret, format }, made))
 }
 
 /// Checks the URL of a webhook.
@@ -205,6 +208,10 @@ pub(crate) fn check_rule(rule: &NewRuleView) -> Result<(), Invalid> {
     if rule.repeat_s.is_some_and(|s| !REPEAT_S.contains(&s)) {
         let (least, most) = REPEAT_S.into_inner();
         return Err(Invalid::new("/repeat_s", format!("must be from {least} to {most} s")));
+    }
+    if rule.delay_s.is_some_and(|s| !DELAY_S.contains(&s)) {
+        let (least, most) = DELAY_S.into_inner();
+        return Err(Invalid::new("/delay_s", format!("must be from {least} to {most} s")));
     }
     Ok(())
 }

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use super::*;
 use crate::{Clock, Limits, Service};
 use offbd_store::{
-    AlarmWrite, AssetRow, CommunicationChange, Location, Micros, MuteRow, Store, Write,
+    AlarmWrite, AssetRow, CommunicationChange, Location, Micros, MuteRow, SessionRow, Store,
+    TransitionRow, Write,
 };
 use offbd_wire::notification::{NewChannelView, NewRuleView, NewWebhookView};
 use offbd_wire::words::AlarmCodeWord;
@@ -55,7 +56,8 @@ impl NotifierFixture {
         parts.committer.spawn().unwrap();
         let asset = AssetRow { name: "a".into(), document: "{}".into(), ..AssetRow::default() };
         service.inner.handles.write("a", vec![Write::CreateAsset(asset)]).await.unwrap();
-        let webhook = NewWebhookView { url: "https://hooks.example/".into(), secret: None };
+        let webhook =
+            NewWebhookView { url: "https://hooks.example/".into(), ..NewWebhookView::default() };
         let channel = NewChannelView { name: "hook".into(), webhook: Some(webhook), email: None };
         let channel = service.create_channel(channel).await.unwrap().channel.id;
         let mut whole = json!({ "name": "r", "channel": channel });
@@ -77,6 +79,29 @@ impl NotifierFixture {
             session: None,
             is_lost,
             since: 0,
+            at: self.inbox.clock.load(Ordering::SeqCst),
+            document: document.to_string(),
+        }))
+        .await;
+    }
+
+    /// The servo along x is confirmed as failing, with or without a kind, as the transition
+    /// `ordinal` of a session.
+    async fn confirm(&self, ordinal: i64, kind: Option<&str>) {
+        if ordinal == 0 {
+            let session = SessionRow { id: "s".into(), asset: "a".into(), ..SessionRow::default() };
+            self.write(Write::OpenSession(session)).await;
+        }
+        let document = json!({ "type": "fault", "code": "x_servo", "status": "confirmed",
+            "status_byte": "2F", "onset_s": 1.5, "kind": kind });
+        self.write(Write::Transition(TransitionRow {
+            id: 0,
+            asset: "a".into(),
+            session: "s".into(),
+            ordinal,
+            t_s: 2.0,
+            code: "x_servo".into(),
+            status: "confirmed".into(),
             at: self.inbox.clock.load(Ordering::SeqCst),
             document: document.to_string(),
         }))
@@ -155,6 +180,34 @@ async fn a_fault_in_a_silence_is_told_at_its_end_if_the_rule_repeats() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_fault_is_told_once_it_has_failed_for_as_long_as_the_rule_waits() {
+    let fixture = NotifierFixture::new(json!({ "delay_s": 600 })).await;
+    // A loss that ends earlier is not told, nor is its end, whether both are planned together or not.
+    fixture.change(true).await;
+    assert_eq!(fixture.pass(300 * SECOND, 100 * SECOND).await, []);
+    fixture.change(false).await;
+    fixture.change(true).await;
+    fixture.change(false).await;
+    assert_eq!(fixture.pass(2000 * SECOND, 100 * SECOND).await, []);
+    fixture.change(true).await;
+    let sent = fixture.pass(4000 * SECOND, 100 * SECOND).await;
+    assert_eq!(sent, attempts(&[(2600, "confirmed.v1", "evt_5")]));
+    fixture.change(false).await;
+    let sent = fixture.pass(4100 * SECOND, 100 * SECOND).await;
+    assert_eq!(sent, attempts(&[(4000, "passed.v1", "evt_6")]));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_fault_that_is_told_late_is_repeated_from_then_on() {
+    let rule = json!({ "delay_s": 600, "repeat_s": 3600 });
+    let fixture = NotifierFixture::new(rule).await;
+    fixture.change(true).await;
+    let sent = fixture.pass(2 * HOUR, 600 * SECOND).await;
+    let expected = [(600, "confirmed.v1", "evt_1"), (4200, "reminder.v1", "evt_1.1")];
+    assert_eq!(sent, attempts(&expected));
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_muted_fault_is_neither_told_nor_reminded_of() {
     let fixture = NotifierFixture::new(json!({ "repeat_s": 3600 })).await;
     fixture.change(true).await;
@@ -197,4 +250,24 @@ async fn a_target_that_is_away_gets_all_in_order_or_they_are_given_up() {
     assert_eq!((newest.message_id.as_str(), newest.state.as_str()), ("evt_3", "given_up"));
     assert_eq!(newest.error.as_deref(), Some("away"));
     assert_eq!(fixture.pass(50 * HOUR, 300 * SECOND).await, [], "given up for good");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_kind_that_follows_soon_is_in_the_first_message_and_a_late_one_updates_it() {
+    let fixture = NotifierFixture::new(json!({})).await;
+    fixture.confirm(0, None).await;
+    assert_eq!(fixture.pass(SECOND, SECOND).await, [], "it waits for its kind");
+    fixture.confirm(1, Some("dead")).await;
+    let sent = fixture.pass(5 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(1, "confirmed.v1", "evt_2")]));
+
+    let fixture = NotifierFixture::new(json!({})).await;
+    fixture.confirm(0, None).await;
+    let sent = fixture.pass(5 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(2, "confirmed.v1", "evt_1")]));
+    fixture.confirm(1, Some("dead")).await;
+    let sent = fixture.pass(6 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(5, "updated.v1", "evt_2")]));
+    let last = fixture.inbox.attempts.lock().unwrap().pop().unwrap();
+    assert_eq!(last.1.data.updates.as_deref(), Some("evt_1"));
 }

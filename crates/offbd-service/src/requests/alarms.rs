@@ -1,13 +1,14 @@
 //! The alarms of the fleet: faults on record, and lost communication.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::mutes::alarm_code;
 use crate::clock::rfc3339;
-use crate::{Service, ServiceError, views};
+use crate::{EntityTag, Expected, Service, ServiceError, views};
 use offbd_core::vocabulary::Invalid;
 use offbd_store::{
-    AlarmWrite, CommunicationRow, FaultFilter, FaultOrder, FaultRow, Micros, NoteRow, Write,
+    AlarmWrite, CommunicationRow, EditWrite, Expectation, FaultFilter, FaultOrder, FaultRow,
+    Micros, NoteRow, Write,
 };
 use offbd_wire::advice;
 use offbd_wire::alarm::{
@@ -54,7 +55,8 @@ impl AlarmQuery {
     fn takes(&self, alarm: &AlarmView, changed_at: Micros) -> bool {
         let on_record = matches!(alarm.status, StatusWord::Pending | StatusWord::Confirmed);
         let in_state = match self.state.unwrap_or(AlarmStateFilter::Active) {
-            AlarmStateFilter::Failing => alarm.failing,
+            AlarmStateFilter::Failing => alarm.failing && alarm.status == StatusWord::Confirmed,
+            AlarmStateFilter::Suspected => alarm.failing && alarm.status == StatusWord::Pending,
             AlarmStateFilter::OnRecord => on_record && !alarm.failing,
             AlarmStateFilter::Active => on_record,
             AlarmStateFilter::All => alarm.status != StatusWord::Cleared,
@@ -203,6 +205,7 @@ impl Service {
             tested: !record.status_bits.test_not_completed_this_operation_cycle,
             // Looked up later, for the whole page at once.
             session_open: false,
+            communication_lost_since: None,
             since: last.as_ref().map(|last| last.noted_at.clone()),
             changed_at,
             occurrences: record.occurrences,
@@ -233,6 +236,7 @@ impl Service {
             failing: is_lost,
             tested: true,
             session_open: false,
+            communication_lost_since: None,
             since: Some(rfc3339(row.since)),
             changed_at: rfc3339(row.changed_at),
             occurrences: u32::try_from(row.occurrences).unwrap_or(u32::MAX),
@@ -242,8 +246,8 @@ impl Service {
         }
     }
 
-    /// Completes a page by what is stored of sessions: whether the recordings are there, and
-    /// which rigs have an open session.
+    /// Completes a page by what is stored of sessions: whether the recordings are there, which
+    /// rigs have an open session, and of which no data arrive.
     async fn add_sessions(&self, alarms: &mut [AlarmView]) -> Result<(), ServiceError> {
         let store = &self.inner.handles.store;
         let ids: Vec<_> = alarms.iter().filter_map(|alarm| alarm.session_id.clone()).collect();
@@ -251,7 +255,14 @@ impl Service {
         let assets: BTreeSet<_> = alarms.iter().map(|alarm| alarm.asset.clone()).collect();
         let assets: Vec<_> = assets.into_iter().collect();
         let open: BTreeSet<_> = store.assets_with_session(&assets).await?.into_iter().collect();
+        let lost: BTreeMap<_, _> = match (assets.first(), assets.last()) {
+            (Some(first), Some(last)) => {
+                store.lost_communications_of(first, last).await?.into_iter().collect()
+            }
+            _ => BTreeMap::new(),
+        };
         for alarm in alarms {
+            alarm.communication_lost_since = lost.get(&alarm.asset).copied().map(rfc3339);
             let is_there = alarm.session_id.as_ref().is_some_and(|id| existing.contains(id));
             alarm.evidence = evidence(alarm, is_there);
             alarm.session_open = open.contains(&alarm.asset);
@@ -321,14 +332,18 @@ impl Service {
     /// Replaces the owner's note on a code; an empty text removes it.
     ///
     /// # Errors
-    /// [`ServiceError::UnknownCode`]; [`ServiceError::Invalid`].
+    /// [`ServiceError::UnknownCode`]; [`ServiceError::Invalid`];
+    /// [`ServiceError::Changed`] if the present note is not the expected one.
     pub async fn put_note(
         &self,
         word: &str,
         note: NewNoteView,
         actor: String,
+        expected: &Expected,
     ) -> Result<NoteView, ServiceError> {
         let code = alarm_code(word)?;
+        let found = self.note(code).await?;
+        expected.check(found.as_ref().map(note_tag).transpose()?.as_ref())?;
         let text = note.text.trim().to_owned();
         if text.len() > MAX_NOTE || text.chars().any(|c| c.is_control() && c != '\n') {
             let reason = format!("must be at most {MAX_NOTE} bytes without control characters");
@@ -340,21 +355,42 @@ impl Service {
             true => AlarmWrite::RemoveNote { code: row.code.clone() },
             false => AlarmWrite::Note(row.clone()),
         };
-        self.inner.handles.write_unpartitioned(Write::Alarm(write)).await?;
+        if expected.is_particular() {
+            let unchanged = Expectation::Note { code: row.code.clone(), found };
+            if !self.inner.handles.edit(None, unchanged, EditWrite::Alarm(write)).await? {
+                let now = self.note(code).await?.as_ref().map(note_tag).transpose()?;
+                return Err(ServiceError::Changed { now });
+            }
+        } else {
+            self.inner.handles.write_unpartitioned(Write::Alarm(write)).await?;
+        }
         note_view(row)
+    }
+
+    async fn note(&self, code: AlarmCodeWord) -> Result<Option<NoteRow>, ServiceError> {
+        let mut rows = self.inner.handles.store.notes().await?;
+        rows.retain(|row| row.code == code.to_string());
+        Ok(rows.pop())
     }
 }
 
+fn note_tag(row: &NoteRow) -> Result<EntityTag, ServiceError> {
+    EntityTag::of(&(&row.text, &row.actor, row.at))
+}
+
 fn note_view(row: NoteRow) -> Result<NoteView, ServiceError> {
+    let etag = note_tag(&row)?.to_string();
     let NoteRow { code, text, actor, at } = row;
-    Ok(NoteView { code: views::word(&code)?, text, by: actor, at: rfc3339(at) })
+    Ok(NoteView { code: views::word(&code)?, text, by: actor, at: rfc3339(at), etag })
 }
 
 /// Returns what is kept of the last occurrence of an alarm.
 fn evidence(alarm: &AlarmView, has_recording: bool) -> AlarmEvidenceView {
     use EvidenceWord::{Complete, None as Nothing, Partial};
     let (state, reason) = match (alarm.code, alarm.evidence.state, has_recording) {
-        (AlarmCodeWord::CommunicationLost, ..) => (Nothing, "no data arrived that could be kept"),
+        (AlarmCodeWord::CommunicationLost, ..) => {
+            (Nothing, "no data arrived, so nothing was recorded")
+        }
         (_, Partial | Complete, true) => {
             return AlarmEvidenceView { state: Complete, reason: None };
         }

@@ -1,9 +1,10 @@
 //! The fault memory, of one asset and of the fleet.
 
 use crate::asset::{Asset, AssetCommand};
+use crate::clock::rfc3339;
 use crate::{Service, ServiceError, snapshots, views};
 use offbd_core::vocabulary::FaultCode;
-use offbd_store::{FaultFilter, FaultOrder};
+use offbd_store::{FaultFilter, FaultOrder, Micros};
 use offbd_wire::service::{FaultEntryView, MonitorView, Page, monitor_views};
 use offbd_wire::words::{FaultSort, StatusFilter, StatusWord};
 
@@ -32,6 +33,8 @@ fn code(word: &str) -> Result<FaultCode, ServiceError> {
 #[derive(Default)]
 struct SessionMonitors {
     session_open: bool,
+    /// Time at which the last data arrived, if data have stopped during the open session.
+    lost_since: Option<Micros>,
     /// Empty without a session, or if none of its states is known.
     monitors: Vec<MonitorView>,
 }
@@ -43,6 +46,7 @@ impl SessionMonitors {
         let at = self.monitors.iter().position(is_of_entry);
         entry.monitor = at.map(|at| self.monitors.swap_remove(at));
         entry.session_open = Some(self.session_open);
+        entry.communication_lost_since = self.lost_since.map(rfc3339);
     }
 }
 
@@ -110,9 +114,14 @@ impl Service {
     /// error too.
     async fn monitors(&self, asset: &str) -> Result<SessionMonitors, ServiceError> {
         let mut found = match self.inner.shards.look(asset, Asset::monitors).await? {
-            Some(monitors) => SessionMonitors { session_open: !monitors.is_empty(), monitors },
+            Some(monitors) => {
+                let session_open = !monitors.is_empty();
+                SessionMonitors { session_open, monitors, ..SessionMonitors::default() }
+            }
             None => self.stored_monitors(asset).await?,
         };
+        let lost = self.inner.handles.store.lost_communications(Some(asset)).await?;
+        found.lost_since = lost.first().map(|row| row.since);
         self.show_mutes(asset, &mut found.monitors);
         Ok(found)
     }
@@ -127,7 +136,8 @@ impl Service {
         let snapshot = store.snapshot(&session.id, &snapshots::version(), i64::MAX).await;
         let restored = snapshots::undamaged(snapshot, &session)?;
         let monitors = restored.map(|(_, engine)| monitor_views(&engine.judging.engine().state()));
-        Ok(SessionMonitors { session_open: true, monitors: monitors.unwrap_or_default() })
+        let monitors = monitors.unwrap_or_default();
+        Ok(SessionMonitors { session_open: true, monitors, ..SessionMonitors::default() })
     }
 
     /// Returns the fault memory entry of one code; a code that never failed is `cleared`.

@@ -12,7 +12,7 @@ use offbd_core::vocabulary::Sample;
 use offbd_wire::judging::run_name;
 use offbd_wire::service::{ImportView, SessionView};
 use offbd_wire::session_file::{
-    self, SessionFileError, SessionFormat, SessionRowError, SessionRows,
+    self, JoinedRows, SessionFileError, SessionFormat, SessionRowError, SessionRows,
 };
 use offbd_wire::table::{self, InspectionView, TableOptions};
 use offbd_wire::telemetry::{AckView, Batch, BatchError, RowView, file_row};
@@ -29,8 +29,9 @@ const BATCH: usize = 2048;
 const STOPPED: ServiceError = ServiceError::Unavailable { what: "the service is shutting down" };
 
 impl Service {
-    /// Imports the session file `source` of at most `limit` rows as the session `name` and ends
-    /// it; a file whose clock starts again becomes several sessions, `name`, `name#2` and so on.
+    /// Imports `files` of at most `limit` rows as the session `name` and ends it. Several files are
+    /// one recording, in the order of their times, and must not overlap; one file whose clock starts
+    /// again becomes several sessions, `name`, `name#2` and so on.
     /// Waits until few enough other files are read, then reads it on a blocking thread. The
     /// asset's open session is ended when the file has been opened; from then until the import
     /// is complete, live telemetry of the asset is refused with [`ServiceError::Busy`]. An import
@@ -47,8 +48,7 @@ impl Service {
         &self,
         asset: &str,
         name: Option<String>,
-        source: S,
-        format: Option<SessionFormat>,
+        files: Vec<ImportFile<S>>,
         options: TableOptions,
         limit: usize,
     ) -> Result<ImportView, ServiceError> {
@@ -58,7 +58,7 @@ impl Service {
         let permit = stop.run_until_cancelled(permit).await.and_then(Result::ok).ok_or(STOPPED)?;
         let import = Import { service: self.clone(), asset: asset.to_owned(), limit, stop };
         let task = tokio::task::spawn_blocking(move || {
-            let imported = import.run(name, source, format, &options);
+            let imported = import.run(name, files, &options);
             drop(permit);
             imported
         });
@@ -96,6 +96,15 @@ impl Service {
     }
 }
 
+/// A file that is imported.
+pub struct ImportFile<S> {
+    /// Its name, in errors of several files.
+    pub name: String,
+    pub source: S,
+    /// Its format; its first bytes say it if `None`.
+    pub format: Option<SessionFormat>,
+}
+
 /// An import on its blocking thread.
 struct Import {
     service: Service,
@@ -109,13 +118,29 @@ impl Import {
     fn run(
         self,
         name: Option<String>,
-        source: impl Read + Seek + Send + 'static,
-        format: Option<SessionFormat>,
+        files: Vec<ImportFile<impl Read + Seek + Send + 'static>>,
         options: &TableOptions,
     ) -> Result<ImportView, ServiceError> {
-        let source = StoppableSource { source, stop: self.stop.clone() };
-        let rows =
-            session_file::open(source, format, options).map_err(|error| self.unreadable(&error))?;
+        let is_joined = files.len() > 1;
+        let open = |ImportFile { name: file, source, format }| {
+            let source = StoppableSource { source, stop: self.stop.clone() };
+            match session_file::open(source, format, options) {
+                Ok(rows) => Ok((file, rows)),
+                Err(error) if is_joined => {
+                    Err(SessionFileError::Part { file, reason: error.to_string() })
+                }
+                Err(error) => Err(error),
+            }
+        };
+        let opened = files.into_iter().map(open).collect::<Result<Vec<_>, _>>();
+        let mut opened = opened.map_err(|error| self.unreadable(&error))?;
+        let rows = match opened.pop() {
+            Some((_, rows)) if !is_joined => rows,
+            last => {
+                opened.extend(last);
+                Box::new(JoinedRows::new(opened))
+            }
+        };
         let runtime = self.service.inner.handles.runtime.clone();
         runtime.block_on(self.import(name, RunRows { rows, next: None }))
     }

@@ -34,6 +34,7 @@ pub use alarms::AlarmQuery;
 pub use events::PresentFault;
 pub use faults::FaultQuery;
 pub use fleet::FleetQuery;
+pub use import::ImportFile;
 pub use notifications::DeliveryQuery;
 pub use readiness::QueueLoad;
 pub use series::{MAX_SERIES_SESSIONS, SeriesQuery};

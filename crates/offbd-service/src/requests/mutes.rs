@@ -1,7 +1,7 @@
 //! Mutes of monitors.
 
 use crate::clock::{parse_timestamp, rfc3339};
-use crate::{Service, ServiceError};
+use crate::{Expected, Service, ServiceError};
 use offbd_core::vocabulary::Invalid;
 use offbd_store::{AlarmWrite, MuteRow, Write};
 use offbd_wire::alarm::{MuteView, NewMuteView};
@@ -23,13 +23,15 @@ impl Service {
     ///
     /// # Errors
     /// [`ServiceError::UnknownAsset`]; [`ServiceError::UnknownCode`];
-    /// [`ServiceError::Invalid`] with the invalid element.
+    /// [`ServiceError::Invalid`] with the invalid element;
+    /// [`ServiceError::Changed`] if the present mute is not the expected one.
     pub async fn mute(
         &self,
         asset: &str,
         word: &str,
         new: NewMuteView,
         actor: String,
+        expected: &Expected,
     ) -> Result<MuteView, ServiceError> {
         let code = alarm_code(word)?;
         self.check_known(asset).await?;
@@ -45,6 +47,8 @@ impl Service {
             let must = format!("must be after {} and within a year", rfc3339(now));
             return Err(Invalid::new("/until", must).into());
         }
+        let _changing = self.inner.mutes.begin_change().await;
+        expected.check(self.inner.mutes.tag_of(asset, code, now)?.as_ref())?;
         let (asset, code_word) = (asset.to_owned(), code.to_string());
         let row = MuteRow { asset, code: code_word, actor, reason, at: now, until };
         let write = Write::Alarm(AlarmWrite::Mute(row.clone()));
@@ -59,9 +63,17 @@ impl Service {
     ///
     /// # Errors
     /// As for [`Self::mute`].
-    pub async fn unmute(&self, asset: &str, word: &str) -> Result<(), ServiceError> {
+    pub async fn unmute(
+        &self,
+        asset: &str,
+        word: &str,
+        expected: &Expected,
+    ) -> Result<(), ServiceError> {
         let code = alarm_code(word)?;
         self.check_known(asset).await?;
+        let _changing = self.inner.mutes.begin_change().await;
+        let now = self.inner.handles.clock.now();
+        expected.check(self.inner.mutes.tag_of(asset, code, now)?.as_ref())?;
         let write = AlarmWrite::Unmute { asset: asset.to_owned(), code: code.to_string() };
         self.inner.handles.write(asset, vec![Write::Alarm(write)]).await?;
         self.inner.mutes.remove(asset, code);

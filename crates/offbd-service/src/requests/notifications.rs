@@ -17,7 +17,7 @@ use offbd_wire::notification::{
     NotificationView, RuleView, StoredChannel,
 };
 use offbd_wire::service::Page;
-use offbd_wire::words::{ChannelKind, DeliveryState};
+use offbd_wire::words::{ChannelKind, DeliveryState, WebhookFormat};
 
 /// The parameters of a query for deliveries.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +73,8 @@ impl Service {
         };
         let pending = count(DeliveryState::Pending).await?;
         let given_up = count(DeliveryState::GivenUp).await?;
-        let (kind, url, email) = shown(stored(&row)?);
+        let (kind, webhook, email) = shown(stored(&row)?);
+        let (url, format) = webhook.unzip();
         let created_at = rfc3339(row.created_at);
         Ok(ChannelView {
             id: row.id,
@@ -81,6 +82,7 @@ impl Service {
             name: row.name,
             kind,
             url,
+            format,
             email,
             created_at,
             pending,
@@ -351,11 +353,14 @@ fn unchanged_rule(row: RuleRow) -> Expectation {
     Expectation::Rule { id: row.id, document: row.document }
 }
 
+/// The kind of a channel, and URL and format of its webhook or the settings of its e-mail.
+type ShownChannel = (ChannelKind, Option<(String, WebhookFormat)>, Option<EmailView>);
+
 /// Returns the settings of a channel without its secrets.
-fn shown(settings: StoredChannel) -> (ChannelKind, Option<String>, Option<EmailView>) {
+fn shown(settings: StoredChannel) -> ShownChannel {
     let kind = settings.kind();
     match settings {
-        StoredChannel::Webhook { url, .. } => (kind, Some(url), None),
+        StoredChannel::Webhook { url, format, .. } => (kind, Some((url, format)), None),
         StoredChannel::Email(email) => (kind, None, Some(settings::email_view(email))),
     }
 }

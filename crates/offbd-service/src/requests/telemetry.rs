@@ -98,11 +98,11 @@ impl Service {
 /// Returns the command that ingests `batch`, and its pending acknowledgement.
 #[expect(clippy::disallowed_methods, reason = "the time to the acknowledgement is a metric")]
 fn ingest(
-    mut batch: Batch,
+    batch: Batch,
     importing: bool,
     permit: OwnedSemaphorePermit,
 ) -> (AssetCommand, PendingBatch) {
-    let unknown = std::mem::take(&mut batch.unknown);
+    let unknown = batch.unknown.clone();
     let (reply, answer) = Reply::new();
     let (request, reply) = (Span::current(), reply.with_permit(permit));
     let command = AssetCommand::Ingest { batch, importing, request, reply };

@@ -89,7 +89,7 @@ impl Device {
 
     /// Measures `n` samples; returns the batch to be sent, `None` if the window is full.
     pub(super) fn measure(&mut self, n: usize, spoilt: bool) -> Option<SentBatch> {
-        // Without a session name, its first samples tell that the device has begun anew: they
+        // Without a session name, its first samples tell that the device has begun again: they
         // must arrive first.
         let is_begun = self.kind.named || self.acknowledged.iter().any(|(run, _)| *run == self.run);
         let window = if is_begun { self.kind.window } else { 1 };
@@ -139,7 +139,7 @@ impl Device {
         }
     }
 
-    /// Begins anew, and gives up what is not acknowledged.
+    /// Begins again, and gives up what is not acknowledged.
     pub(super) fn reboot(&mut self) {
         self.run += 1;
         (self.n_measured, self.clock_s) = (0, 0.0);
@@ -194,7 +194,7 @@ impl Device {
             match (content, rejected) {
                 (Some(content), None) => drop(self.acknowledged.insert(*content)),
                 (None, Some(_)) => {}
-                // What a nameless device lost before it began anew cannot be told from what
+                // What a nameless device lost before it began again cannot be told from what
                 // it sends then.
                 (Some(_), Some(row)) if !self.kind.named && row.reason.contains("other values") => {
                 }

@@ -23,14 +23,14 @@ pub(super) struct DeviceKind {
     pub(super) window: usize,
 }
 
-/// One step. Numbers are taken modulo what there is to choose from.
+/// One step. A number chooses modulo the number of choices.
 #[derive(Clone, Debug)]
 pub(super) enum Step {
     /// The device measures `n` samples, one of them invalid if `spoilt`, and sends them.
     Measure { device: usize, n: usize, spoilt: bool },
     /// The device sends again what is not acknowledged.
     Resend { device: usize },
-    /// The device begins anew: its count and its clock start at zero.
+    /// The device begins again: its count and its clock start at zero.
     Reboot { device: usize },
     /// The clock of the device is set forward or back, s.
     DeviceClock { device: usize, by_s: f64 },

@@ -305,7 +305,7 @@ mod tests {
         .unwrap()
     }
 
-    /// Otherwise many short sessions would take much more than their share of a core.
+    /// Without a pause after each, many short sessions would take more than their share of a core.
     #[tokio::test(flavor = "multi_thread")]
     async fn all_work_is_followed_by_a_pause() {
         assert_eq!(works(100).await.len(), 1);

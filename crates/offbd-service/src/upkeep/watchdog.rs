@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn waiting_with_commits_is_no_stall() {
+    fn waiting_with_commits_is_not_a_stall() {
         let checks: Vec<_> = (0..100).map(|i| (i * LIMIT / 2, true, i)).collect();
         assert!(stalled(&checks).iter().all(|stalled| !stalled));
     }

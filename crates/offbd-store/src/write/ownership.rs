@@ -19,8 +19,8 @@ use crate::multi_row::{MultiRowStatement, in_parts};
 use crate::partition::PartitionRow;
 use crate::writer_lock::{self, Backend, WriterRole};
 use crate::{
-    Location, MIGRATIONS, NodeIdentity, NodeRow, PartitionId, Partitions, Store, StoreError,
-    TRANSFERS,
+    Location, NodeIdentity, NodeRow, PartitionId, Partitions, Store, StoreError, TRANSFERS,
+    migrations,
 };
 
 /// The first key of the advisory locks of partitions; the second is the partition.
@@ -230,10 +230,7 @@ impl Writer {
             Err(error) => return Err(error),
         }
         let (mut connection, backend) = location.writer(WriterRole::Node, None).await?;
-        let found: i64 = sqlx::query_scalar("SELECT MAX(version) FROM _sqlx_migrations")
-            .fetch_one(&mut connection)
-            .await?;
-        let expected = MIGRATIONS.iter().map(|m| m.version).max().unwrap_or_default();
+        let (found, expected) = (migrations::schema(&mut connection).await?, migrations::latest());
         if found != expected {
             return Err(StoreError::Schema { found, expected });
         }

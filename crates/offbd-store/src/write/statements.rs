@@ -1,4 +1,4 @@
-//! The statements of changes that have no file of their own.
+//! The statements of changes without their own file.
 
 use sqlx::AnyConnection;
 

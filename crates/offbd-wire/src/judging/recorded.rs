@@ -54,7 +54,7 @@ impl RecordedSession {
         Self { name, judging, faults: Vec::new(), bad_rows: Vec::new(), n_rejected: 0 }
     }
 
-    /// Counts a row that is no sample.
+    /// Counts a row that is not a sample.
     pub fn reject(&mut self, error: RejectedRow) {
         self.n_rejected += 1;
         if self.bad_rows.len() < MAX_NAMED_ROWS {
@@ -72,7 +72,7 @@ impl RecordedSession {
     ) {
         let mut take = |input| self.judging.observe(input, &mut observer);
         let admission = match take(Input::Sample(sample)) {
-            // Rows as old as this are no retransmissions in a recording.
+            // Rows as old as this are not retransmissions in a recording.
             Some(Admission::Unknown) => take(Input::NewSample(sample)),
             admission => admission,
         };
@@ -122,7 +122,7 @@ impl RecordedSession {
         let misfits = self.judging.misfits();
         let counts = self.judging.counts();
         if counts.span_s.is_none() {
-            return Err(NoUsableRow::of(&misfits));
+            return Err(NoUsableRow::of(&misfits, self.bad_rows.first()));
         }
         let summary = self.summary();
         let estimates = self.judging.engine().servo_estimates();
@@ -141,9 +141,10 @@ pub struct NoUsableRow {
 }
 
 impl NoUsableRow {
-    fn of(misfits: &[Misfit]) -> Self {
+    fn of(misfits: &[Misfit], rejected: Option<&RejectedRow>) -> Self {
         let units = |m: &&Misfit| matches!(m, Misfit::Positions { .. } | Misfit::Commands { .. });
-        let why = misfits.iter().find(units).map_or_else(String::new, |m| format!(": {m}"));
-        Self { why }
+        let why = misfits.iter().find(units).map(ToString::to_string);
+        let why = why.or_else(|| rejected.map(ToString::to_string));
+        Self { why: why.map_or_else(String::new, |why| format!(": {why}")) }
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Compressed streams are not read: their buffers state the size to reserve, without a limit.
 
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use arrow_array::RecordBatch;
 use arrow_buffer::Buffer;
@@ -11,11 +11,12 @@ use arrow_ipc::reader::StreamDecoder;
 use arrow_ipc::writer::StreamWriter;
 use arrow_schema::SchemaRef;
 
-use super::columns::{self, BatchRows, SchemaIndices};
+use super::columns::{self, BatchRows};
+use super::shared_source::{SharedSource, SourceFrom};
 use super::{
-    ARROW_FILE, RowPlace, SessionFileError, SessionFormat, SessionInfo, SessionRowError,
-    SessionRows, guarded,
+    ARROW_FILE, ColumnFile, SessionFileError, SessionFormat, SessionInfo, TextRows, guarded,
 };
+use crate::table::{Cells, NamedColumns, RowFault, RowSource, TableOptions, TableReader};
 use offbd_core::vocabulary::Sample;
 
 /// Bytes that are read at a time.
@@ -75,16 +76,21 @@ const MESSAGE: &[u8] = &[0xff; 4];
 /// Bytes at the end of an Arrow file: the length of its index and the signature.
 const TAIL_BYTES: u64 = 10;
 
-/// Returns the end of the stream in an Arrow file; `None` if `source` is a stream itself.
-fn stream_end<S: Read + Seek>(source: &mut S) -> Result<Option<u64>, SessionFileError> {
+/// Where the stream in an Arrow file begins at most: programs align it to 8 or 64 bytes.
+const LATEST_START: u64 = 64;
+
+/// Returns the start and the end of the stream in an Arrow file; `None` if `source` is a stream itself.
+fn stream_within<S: Read + Seek>(source: &mut S) -> Result<Option<(u64, u64)>, SessionFileError> {
     let mut head = Vec::with_capacity(ARROW_FILE.len());
     source.by_ref().take(ARROW_FILE.len() as u64).read_to_end(&mut head)?;
     if head != ARROW_FILE {
         return Ok(None);
     }
-    let mut mark = Vec::new();
-    source.by_ref().take(MESSAGE.len() as u64).read_to_end(&mut mark)?;
-    if mark != MESSAGE {
+    let (mut start, mut mark) = (ARROW_FILE.len() as u64, Vec::new());
+    source.by_ref().take(LATEST_START).read_to_end(&mut mark)?;
+    let n_zeros = mark.iter().take_while(|byte| **byte == 0).count();
+    start += n_zeros as u64;
+    if !mark[n_zeros..].starts_with(MESSAGE) || start > LATEST_START {
         return Err(damaged("it has no stream, only an index; write it as an Arrow stream"));
     }
     let n_bytes = source.seek(SeekFrom::End(0))?;
@@ -94,14 +100,83 @@ fn stream_end<S: Read + Seek>(source: &mut S) -> Result<Option<u64>, SessionFile
     match tail.split_first_chunk::<4>() {
         Some((length, SIGNATURE)) => {
             let index = u64::from(u32::from_le_bytes(*length));
-            Ok(Some(n_bytes.saturating_sub(TAIL_BYTES + index)))
+            Ok(Some((start, n_bytes.saturating_sub(TAIL_BYTES + index))))
         }
         _ => Err(damaged("it does not end with its signature")),
     }
 }
 
+/// An Arrow stream or file whose columns are known.
+pub(super) struct ArrowTable<S> {
+    source: SharedSource<S>,
+    schema: SchemaRef,
+    columns: NamedColumns,
+}
+
+impl<S: Read + Seek + Send + 'static> ArrowTable<S> {
+    /// Reads the schema and the first record batch.
+    pub(super) fn open(source: S) -> Result<Self, SessionFileError> {
+        let source = SharedSource::new(source)?;
+        let mut batches = Batches::new(source.from(0))?;
+        let first = batches.next()?;
+        let schema = batches.decoder.schema().ok_or_else(|| damaged("it has no schema"))?;
+        let values = |batch: RecordBatch| {
+            let arrays = batch.columns().iter();
+            arrays.map(|array| columns::first_values(array)).collect::<Vec<_>>()
+        };
+        let first_rows = columns::rows_of(&first.map_or(Vec::new(), values));
+        let columns = NamedColumns { names: columns::names(&schema), first_rows };
+        Ok(Self { source, schema, columns })
+    }
+
+    fn rows_of(&self, wanted: &[usize]) -> Result<ArrowRows<S>, SessionFileError> {
+        columns::check(&self.schema, wanted)?;
+        let place = |column: usize| wanted.contains(&column).then_some(column);
+        let places = (0..self.columns.names.len()).map(place).collect();
+        let batches = Batches::new(self.source.from(0))?;
+        Ok(ArrowRows { batches: Some(batches), rows: BatchRows::new(places) })
+    }
+}
+
+impl<S: Read + Seek + Send + 'static> ColumnFile for ArrowTable<S> {
+    fn columns(&self) -> &NamedColumns {
+        &self.columns
+    }
+
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'static>, SessionFileError> {
+        let rows = |wanted: &[usize]| self.rows_of(wanted);
+        TableReader::of_columns(&self.columns, options, rows).map(TextRows::of_columns)
+    }
+}
+
 /// The rows of an Arrow stream or file.
-pub(super) struct ArrowRows<S> {
+struct ArrowRows<S: Read + Seek> {
+    /// `None` after the end, or an error.
+    batches: Option<Batches<io::BufReader<SourceFrom<S>>>>,
+    rows: BatchRows,
+}
+
+impl<S: Read + Seek + Send> RowSource for ArrowRows<S> {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+        while !self.rows.next(cells) {
+            match self.batches.as_mut().map_or(Ok(None), Batches::next) {
+                Ok(Some(batch)) => self.rows.set(batch),
+                end => {
+                    self.batches = None;
+                    return end.map(|_| false).map_err(RowFault::Unreadable);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn line(&self) -> u64 {
+        self.rows.n_read()
+    }
+}
+
+/// The record batches of an Arrow stream or file.
+struct Batches<S> {
     source: S,
     /// Bytes of the stream that are not read yet, at most.
     left: u64,
@@ -110,46 +185,27 @@ pub(super) struct ArrowRows<S> {
     unread: Buffer,
     /// Bytes since the last record batch.
     n_bytes: u64,
-    rows: BatchRows,
-    has_ended: bool,
 }
 
-impl<S: Read + Seek> ArrowRows<S> {
-    /// Reads the schema and the first record batch.
-    pub(super) fn new(mut source: S) -> Result<Self, SessionFileError> {
-        let stream_end = stream_end(&mut source)?;
-        let start = stream_end.map_or(0, |_| ARROW_FILE.len() as u64);
+impl<S: Read + Seek> Batches<S> {
+    fn new(mut source: S) -> Result<Self, SessionFileError> {
+        let within = stream_within(&mut source)?;
+        let start = within.map_or(0, |(start, _)| start);
         source.seek(SeekFrom::Start(start))?;
-        let mut this = Self {
+        Ok(Self {
             source,
-            left: stream_end.map_or(u64::MAX, |end| end.saturating_sub(start)),
-            is_file: stream_end.is_some(),
+            left: within.map_or(u64::MAX, |(start, end)| end.saturating_sub(start)),
+            is_file: within.is_some(),
             decoder: StreamDecoder::new(),
             unread: Buffer::from_vec(Vec::<u8>::new()),
             n_bytes: 0,
-            rows: BatchRows::new(),
-            has_ended: false,
-        };
-        this.advance()?;
-        let schema = this.decoder.schema().ok_or_else(|| damaged("it has no schema"))?;
-        SchemaIndices::of(&schema)?;
-        Ok(this)
+        })
     }
 }
 
-impl<S: Read> ArrowRows<S> {
-    /// Goes on to the next record batch, or to the end.
-    fn advance(&mut self) -> Result<(), SessionFileError> {
-        match self.batch()? {
-            Some(batch) => self.rows.set(batch),
-            None => {
-                self.has_ended = true;
-                Ok(())
-            }
-        }
-    }
-
-    fn batch(&mut self) -> Result<Option<RecordBatch>, SessionFileError> {
+impl<S: Read> Batches<S> {
+    /// Returns the next record batch; `None` at the end.
+    fn next(&mut self) -> Result<Option<RecordBatch>, SessionFileError> {
         loop {
             if self.unread.is_empty() {
                 let mut bytes = Vec::with_capacity(READ_BYTES);
@@ -183,9 +239,7 @@ impl<S: Read> ArrowRows<S> {
             }
         }
     }
-}
 
-impl<S: Read> ArrowRows<S> {
     /// Checks that the source, of which nothing is left, has the mark at the end of a stream.
     fn check_end(&mut self) -> Result<(), SessionFileError> {
         self.decoder.finish().map_err(damaged)?;
@@ -198,30 +252,5 @@ impl<S: Read> ArrowRows<S> {
             Err(_) => Ok(()),
             Ok(_) => Err(damaged("it has no mark of its end")),
         }
-    }
-}
-
-impl<S: Read> Iterator for ArrowRows<S> {
-    type Item = Result<Sample, SessionRowError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            if let Some(row) = self.rows.next() {
-                return Some(row);
-            }
-            if self.has_ended {
-                return None;
-            }
-            if let Err(error) = self.advance() {
-                self.has_ended = true;
-                return Some(Err(SessionRowError::Unreadable(error)));
-            }
-        }
-    }
-}
-
-impl<S: Read + Send> SessionRows for ArrowRows<S> {
-    fn place(&self) -> RowPlace {
-        self.rows.place()
     }
 }

@@ -5,12 +5,10 @@ use super::SessionFileError;
 /// Decompressed bytes that are read of a file, over all its parts, unless the file is long (see
 /// [`MAX_EXPANSION`]). Chosen: 2 million samples of 500 bytes; a sample as JSON has 130. A file
 /// with more is refused.
-#[cfg(any(feature = "mcap", feature = "parquet"))]
 const MAX_DECOMPRESSED_BYTES: u64 = 1 << 30;
 
 /// Decompressed bytes for each byte of a long file. Chosen: three times the measured 11 of an
 /// MCAP file with the plate and the evidence. A file that expands further is refused.
-#[cfg(any(feature = "mcap", feature = "parquet"))]
 const MAX_EXPANSION: u64 = 32;
 
 /// The decompressed bytes that may still be read of one file.
@@ -28,7 +26,6 @@ impl ByteBudget {
     }
 
     /// The budget of a file of `n_bytes`.
-    #[cfg(any(feature = "mcap", feature = "parquet"))]
     pub(super) fn of_file(n_bytes: u64) -> Self {
         Self::new("the file", n_bytes.saturating_mul(MAX_EXPANSION).max(MAX_DECOMPRESSED_BYTES))
     }
@@ -44,7 +41,7 @@ impl ByteBudget {
     }
 }
 
-#[cfg(all(test, any(feature = "mcap", feature = "parquet")))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

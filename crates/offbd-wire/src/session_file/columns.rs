@@ -1,29 +1,34 @@
 //! The columns of a session as Arrow arrays: one schema for Parquet and Arrow, written with
-//! 64-bit numbers and read from any numeric type.
+//! 64-bit numbers. Columns of any name are read, of numbers, text, dates and times.
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
-    ArrowPrimitiveType, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type,
-    Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    ArrowPrimitiveType, Date32Type, Date64Type, Decimal128Type, Float16Type, Float32Type,
+    Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, Time32MillisecondType,
+    Time32SecondType, Time64MicrosecondType, Time64NanosecondType, TimestampMicrosecondType,
+    TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type,
+    UInt32Type, UInt64Type,
 };
 use arrow_array::{
     Array, ArrayRef, Float64Array, Int64Array, RecordBatch, TimestampMicrosecondArray,
 };
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef, TimeUnit};
+use jiff::Timestamp;
 
-use super::{RejectedRow, RowPlace, SessionFileError, SessionInfo, SessionRowError, unix_micros};
+use super::line::line_of;
+use super::{SessionFileError, SessionInfo, unix_micros};
 use crate::session_csv::COLUMNS;
-use crate::telemetry::MAX_SEQ;
+use crate::table::{Cells, JUDGED_ROWS};
 use offbd_core::vocabulary::Sample;
 
 /// The name of the column with the numbers of the samples, which may be missing.
 const SEQ: &str = "seq";
 
 /// The name of the column with absolute times, which only tables of a clock that counts from 1970
-/// have. It is not read back.
+/// have.
 const TIME: &str = "time";
 
 /// The column with absolute times, if `info` says that the clock has them.
@@ -70,157 +75,173 @@ pub(super) fn batch(schema: &SchemaRef, samples: &[Sample]) -> Result<RecordBatc
     RecordBatch::try_new(schema.clone(), columns)
 }
 
-/// Indices of the columns of a session in a schema.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SchemaIndices {
-    columns: [usize; COLUMNS.len()],
-    seq: Option<usize>,
+/// The names of the columns of `schema`.
+pub(super) fn names(schema: &Schema) -> Vec<String> {
+    schema.fields().iter().map(|field| line_of(field.name())).collect()
 }
 
-impl SchemaIndices {
-    /// Finds the columns in `schema`.
-    ///
-    /// # Errors
-    /// [`SessionFileError`] if one is missing, repeated or not numeric.
-    pub(super) fn of(schema: &Schema) -> Result<Self, SessionFileError> {
-        let mut columns = [0; COLUMNS.len()];
-        for (slot, name) in columns.iter_mut().zip(COLUMNS) {
-            *slot = find(schema, name)?.ok_or(SessionFileError::NoColumn(name))?;
-        }
-        Ok(Self { columns, seq: find(schema, SEQ)? })
-    }
+/// Whether values of this type can be read.
+pub(super) fn is_read(data_type: &DataType) -> bool {
+    let is_other = matches!(
+        data_type,
+        DataType::Decimal32(..)
+            | DataType::Decimal64(..)
+            | DataType::Decimal256(..)
+            | DataType::Interval(_)
+            | DataType::Duration(_)
+    );
+    let is_value = data_type.is_numeric()
+        || data_type.is_string()
+        || data_type.is_temporal()
+        || *data_type == DataType::Null;
+    is_value && !is_other
+}
 
-    /// All indices.
-    pub(super) fn all(&self) -> impl Iterator<Item = usize> {
-        self.columns.into_iter().chain(self.seq)
+/// Checks that the columns `wanted` have types that are read.
+///
+/// # Errors
+/// [`SessionFileError::NotANumber`].
+pub(super) fn check(schema: &Schema, wanted: &[usize]) -> Result<(), SessionFileError> {
+    let mut fields = wanted.iter().map(|column| schema.field(*column));
+    match fields.find(|field| !is_read(field.data_type())) {
+        None => Ok(()),
+        Some(field) => Err(SessionFileError::NotANumber {
+            column: line_of(field.name()),
+            found: field.data_type().to_string(),
+        }),
     }
 }
 
-fn find(schema: &Schema, name: &'static str) -> Result<Option<usize>, SessionFileError> {
-    let mut found = (0..schema.fields().len()).filter(|&i| schema.field(i).name() == name);
-    let (first, second) = (found.next(), found.next());
-    if second.is_some() {
-        return Err(SessionFileError::TwoColumns(name));
+/// Appends the value at `row`, which must be in the array; nothing of a type that is not read.
+fn push(cells: &mut Cells, array: &dyn Array, row: usize) {
+    fn value<T: ArrowPrimitiveType>(array: &dyn Array, row: usize) -> T::Native {
+        array.as_primitive::<T>().value(row)
     }
-    let Some(index) = first else { return Ok(None) };
-    let data_type = schema.field(index).data_type();
-    if data_type.is_integer() || data_type.is_floating() || *data_type == DataType::Null {
-        return Ok(Some(index));
-    }
-    Err(SessionFileError::NotANumber { column: name, found: data_type.to_string() })
-}
-
-/// A value of a numeric column.
-#[derive(Clone, Copy)]
-enum Number {
-    Missing,
-    Whole(i128),
-    Real(f64),
-}
-
-impl Number {
-    /// Reads the value at `row`, which must be in the array.
-    fn of(array: &dyn Array, row: usize) -> Self {
-        fn value<T: ArrowPrimitiveType>(array: &dyn Array, row: usize) -> Option<T::Native> {
-            array.as_primitive_opt::<T>().map(|a| a.value(row))
-        }
-        let whole = |value: Option<i128>| value.map_or(Self::Missing, Self::Whole);
-        let real = |value: Option<f64>| value.map_or(Self::Missing, Self::Real);
-        if array.is_null(row) {
-            return Self::Missing;
-        }
-        match array.data_type() {
-            DataType::Float64 => real(value::<Float64Type>(array, row)),
-            DataType::Float32 => real(value::<Float32Type>(array, row).map(f64::from)),
-            DataType::Float16 => real(value::<Float16Type>(array, row).map(f64::from)),
-            DataType::Int64 => whole(value::<Int64Type>(array, row).map(i128::from)),
-            DataType::Int32 => whole(value::<Int32Type>(array, row).map(i128::from)),
-            DataType::Int16 => whole(value::<Int16Type>(array, row).map(i128::from)),
-            DataType::Int8 => whole(value::<Int8Type>(array, row).map(i128::from)),
-            DataType::UInt64 => whole(value::<UInt64Type>(array, row).map(i128::from)),
-            DataType::UInt32 => whole(value::<UInt32Type>(array, row).map(i128::from)),
-            DataType::UInt16 => whole(value::<UInt16Type>(array, row).map(i128::from)),
-            DataType::UInt8 => whole(value::<UInt8Type>(array, row).map(i128::from)),
-            _ => Self::Missing,
-        }
-    }
-
-    /// The value as a quantity. NaN is the missing value of many data frames.
-    fn quantity(self, column: &str) -> Result<Option<f64>, String> {
-        match self {
-            Self::Missing => Ok(None),
-            Self::Whole(value) => Ok(Some(value as f64)),
-            Self::Real(value) if value.is_nan() => Ok(None),
-            Self::Real(value) if value.is_finite() => Ok(Some(value)),
-            Self::Real(value) => Err(format!("`{column}`: `{value}` is not finite")),
-        }
-    }
-
-    /// The value as the number of a sample, which data frames with missing ones keep as a
-    /// double.
-    fn seq(self) -> Result<Option<u64>, String> {
-        let (whole, shown) = match self {
-            Self::Missing => return Ok(None),
-            Self::Real(value) if value.is_nan() => return Ok(None),
-            Self::Whole(value) => (Some(value), value.to_string()),
-            Self::Real(value) => {
-                ((value.fract() == 0.0).then_some(value as i128), value.to_string())
+    /// A date, a time of day or both, of so many units in a second.
+    fn moment(cells: &mut Cells, value: i64, units: i64, is_clock: bool) {
+        let nanoseconds = i128::from(value) * i128::from(1_000_000_000 / units);
+        match Timestamp::from_nanosecond(nanoseconds) {
+            Ok(moment) if is_clock => {
+                let moment = moment.to_string();
+                cells.push_text(moment.trim_start_matches("1970-01-01T").trim_end_matches('Z'));
             }
-        };
-        let seq = whole.and_then(|whole| u64::try_from(whole).ok()).filter(|seq| *seq <= MAX_SEQ);
-        seq.map(Some).ok_or_else(|| format!("`{SEQ}`: `{shown}` is not a whole number of a sample"))
+            Ok(moment) => cells.push_text(&moment.to_string()),
+            Err(_) => cells.push_text(&value.to_string()),
+        }
     }
+    if array.is_null(row) {
+        return cells.push_text("");
+    }
+    match array.data_type() {
+        DataType::Float64 => cells.push_number(value::<Float64Type>(array, row)),
+        DataType::Float32 => cells.push_number(f64::from(value::<Float32Type>(array, row))),
+        DataType::Float16 => cells.push_number(f64::from(value::<Float16Type>(array, row))),
+        // Text keeps all digits of the number of a sample.
+        DataType::Int64 => cells.push_text(&value::<Int64Type>(array, row).to_string()),
+        DataType::Int32 => cells.push_number(f64::from(value::<Int32Type>(array, row))),
+        DataType::Int16 => cells.push_number(f64::from(value::<Int16Type>(array, row))),
+        DataType::Int8 => cells.push_number(f64::from(value::<Int8Type>(array, row))),
+        DataType::UInt64 => cells.push_text(&value::<UInt64Type>(array, row).to_string()),
+        DataType::UInt32 => cells.push_number(f64::from(value::<UInt32Type>(array, row))),
+        DataType::UInt16 => cells.push_number(f64::from(value::<UInt16Type>(array, row))),
+        DataType::UInt8 => cells.push_number(f64::from(value::<UInt8Type>(array, row))),
+        DataType::Decimal128(..) => {
+            cells.push_text(&array.as_primitive::<Decimal128Type>().value_as_string(row));
+        }
+        DataType::Utf8 => cells.push_text(array.as_string::<i32>().value(row)),
+        DataType::LargeUtf8 => cells.push_text(array.as_string::<i64>().value(row)),
+        DataType::Utf8View => cells.push_text(array.as_string_view().value(row)),
+        DataType::Date32 => {
+            moment(cells, i64::from(value::<Date32Type>(array, row)) * 86_400, 1, false);
+        }
+        DataType::Date64 => moment(cells, value::<Date64Type>(array, row), 1000, false),
+        DataType::Time32(TimeUnit::Second) => {
+            moment(cells, i64::from(value::<Time32SecondType>(array, row)), 1, true);
+        }
+        DataType::Time32(_) => {
+            moment(cells, i64::from(value::<Time32MillisecondType>(array, row)), 1000, true);
+        }
+        DataType::Time64(TimeUnit::Microsecond) => {
+            moment(cells, value::<Time64MicrosecondType>(array, row), 1_000_000, true);
+        }
+        DataType::Time64(_) => {
+            moment(cells, value::<Time64NanosecondType>(array, row), 1_000_000_000, true);
+        }
+        DataType::Timestamp(unit, _) => match unit {
+            TimeUnit::Second => moment(cells, value::<TimestampSecondType>(array, row), 1, false),
+            TimeUnit::Millisecond => {
+                moment(cells, value::<TimestampMillisecondType>(array, row), 1000, false);
+            }
+            TimeUnit::Microsecond => {
+                moment(cells, value::<TimestampMicrosecondType>(array, row), 1_000_000, false);
+            }
+            TimeUnit::Nanosecond => {
+                moment(cells, value::<TimestampNanosecondType>(array, row), 1_000_000_000, false);
+            }
+        },
+        _ => cells.push_text(""),
+    }
+}
+
+/// Returns the first values of a column as text, as [`JUDGED_ROWS`] are judged.
+pub(super) fn first_values(array: &dyn Array) -> Vec<String> {
+    let text = |row: usize| {
+        let mut cells = Cells::default();
+        push(&mut cells, array, row);
+        cells.text(0)
+    };
+    (0..array.len().min(JUDGED_ROWS)).map(text).collect()
+}
+
+/// Returns the rows of columns of values; a column without a value has an empty one.
+pub(super) fn rows_of(columns: &[Vec<String>]) -> Vec<Vec<String>> {
+    let n_rows = columns.iter().map(Vec::len).max().unwrap_or_default();
+    let row = |i: usize| {
+        columns.iter().map(|column| column.get(i).cloned().unwrap_or_default()).collect()
+    };
+    (0..n_rows).map(row).collect()
 }
 
 /// The rows of one record batch after the other.
 pub(super) struct BatchRows {
-    batch: Option<(RecordBatch, SchemaIndices)>,
+    /// Of each column of the file, its place in the batches; `None` if it is not read.
+    places: Vec<Option<usize>>,
+    batch: Option<RecordBatch>,
     next: usize,
     n_read: u64,
 }
 
 impl BatchRows {
-    pub(super) const fn new() -> Self {
-        Self { batch: None, next: 0, n_read: 0 }
+    /// Rows of a file with `n_columns`, in whose batches the columns have the places `places`.
+    pub(super) const fn new(places: Vec<Option<usize>>) -> Self {
+        Self { places, batch: None, next: 0, n_read: 0 }
     }
 
     /// Continues with the rows of `batch`.
-    pub(super) fn set(&mut self, batch: RecordBatch) -> Result<(), SessionFileError> {
-        let indices = SchemaIndices::of(&batch.schema())?;
-        (self.batch, self.next) = (Some((batch, indices)), 0);
-        Ok(())
+    pub(super) fn set(&mut self, batch: RecordBatch) {
+        (self.batch, self.next) = (Some(batch), 0);
     }
 
-    /// Returns the next row; `None` at the end of the batch.
-    pub(super) fn next(&mut self) -> Option<Result<Sample, SessionRowError>> {
-        let (batch, indices) = self.batch.as_ref()?;
-        if self.next >= batch.num_rows() {
+    /// Reads the next row; false at the end of the batch.
+    pub(super) fn next(&mut self, cells: &mut Cells) -> bool {
+        let Some(batch) = self.batch.as_ref().filter(|batch| self.next < batch.num_rows()) else {
             self.batch = None;
-            return None;
+            return false;
+        };
+        cells.clear();
+        for place in &self.places {
+            match place {
+                Some(place) => push(cells, batch.column(*place), self.next),
+                None => cells.push_text(""),
+            }
         }
         self.n_read += 1;
-        let row = sample(batch, indices, self.next);
         self.next += 1;
-        let rejected =
-            |reason| SessionRowError::Rejected(RejectedRow { place: self.place(), reason });
-        Some(row.map_err(rejected))
+        true
     }
 
-    /// The place of the row read last.
-    pub(super) const fn place(&self) -> RowPlace {
-        RowPlace::Row(self.n_read)
+    /// The number of the row read last, from 1.
+    pub(super) const fn n_read(&self) -> u64 {
+        self.n_read
     }
-}
-
-fn sample(batch: &RecordBatch, indices: &SchemaIndices, row: usize) -> Result<Sample, String> {
-    let number = |index: usize| Number::of(batch.column(index), row);
-    let quantity = |i: usize| number(indices.columns[i]).quantity(COLUMNS[i]);
-    Ok(Sample {
-        seq: indices.seq.map_or(Ok(None), |index| number(index).seq())?,
-        t_s: quantity(0)?.ok_or_else(|| format!("`{}` is missing", COLUMNS[0]))?,
-        cmd_qx_rad: quantity(1)?,
-        cmd_qy_rad: quantity(2)?,
-        x_m: quantity(3)?,
-        y_m: quantity(4)?,
-    })
 }

@@ -18,6 +18,7 @@ use serde_json::Value;
 
 use super::line::{LONGEST_CELL, line_of, write_line};
 use super::{SessionFileError, SessionFormat, TextKind};
+use crate::telemetry::lenient::with_quotes;
 
 /// Longest document, bytes. Chosen: a million rows of five numbers with their names.
 const MAX_JSON_BYTES: u64 = 128 << 20;
@@ -46,7 +47,7 @@ pub(crate) struct JsonTable {
 
 impl JsonTable {
     pub(crate) const fn kind(&self) -> TextKind {
-        TextKind::Json { n_before: self.n_before }
+        TextKind::Rows { n_before: self.n_before }
     }
 }
 
@@ -62,17 +63,36 @@ pub(crate) fn table(source: impl Read) -> Result<JsonTable, SessionFileError> {
         return Err(SessionFileError::TooLong { what: "the JSON document", limit });
     }
     let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
-    table_within(bytes, MAX_TEXT_BYTES)
+    match table_within(bytes, MAX_TEXT_BYTES) {
+        // Python writes `NaN`, which is not JSON.
+        Err(SessionFileError::Damaged { reason, format }) => match with_quotes(bytes) {
+            Some(quoted) => table_within(&quoted, MAX_TEXT_BYTES),
+            None => Err(SessionFileError::Damaged { reason, format }),
+        },
+        read => read,
+    }
 }
 
 fn table_within(bytes: &[u8], max_bytes: usize) -> Result<JsonTable, SessionFileError> {
     let mut table = Table { max_bytes, ..Table::default() };
     // The names of all rows are known before the first is written.
     table.read(bytes)?;
-    table.is_writing = true;
+    table.pass = Pass::Text;
     table.columns.clear();
     table.read(bytes)?;
     table.text()
+}
+
+/// What is taken of a row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Pass {
+    /// The names of its values.
+    #[default]
+    Names,
+    /// A line of the text.
+    Text,
+    /// Its cells, which stay until the next row.
+    Cells,
 }
 
 /// The rows and columns of a document, as they are read.
@@ -80,7 +100,7 @@ fn table_within(bytes: &[u8], max_bytes: usize) -> Result<JsonTable, SessionFile
 struct Table {
     /// Longest text of the rows, bytes.
     max_bytes: usize,
-    is_writing: bool,
+    pass: Pass,
     /// The names of the values of rows that are objects, and their places.
     names: Vec<String>,
     places: HashMap<String, usize>,
@@ -134,15 +154,25 @@ impl Table {
     fn read_lines(&mut self, bytes: &[u8]) -> Result<(), SessionFileError> {
         let lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
         for line in lines.filter(|line| !line.is_empty()) {
-            let mut json = serde_json::Deserializer::from_slice(line);
-            let is_row = Row(self).deserialize(&mut json).and_then(|()| json.end());
-            if is_row.is_err() {
+            let mut is_row = self.read_line(line);
+            if !is_row && let Some(quoted) = with_quotes(line) {
+                is_row = self.read_line(&quoted);
+            }
+            if !is_row {
                 self.cells.clear();
                 self.cells.resize(self.names.len(), line_of(&String::from_utf8_lossy(line)));
                 self.end_row()?;
             }
         }
         Ok(())
+    }
+
+    /// Reads a row; returns whether it is one.
+    fn read_line(&mut self, line: &[u8]) -> bool {
+        self.cells.iter_mut().for_each(String::clear);
+        self.next = 0;
+        let mut json = serde_json::Deserializer::from_slice(line);
+        Row(self).deserialize(&mut json).and_then(|()| json.end()).is_ok()
     }
 
     /// Notes a value of a row that is an object.
@@ -169,7 +199,7 @@ impl Table {
     }
 
     fn put_at(&mut self, place: usize, value: impl fmt::Display) {
-        if self.is_writing {
+        if self.pass != Pass::Names {
             if self.cells.len() <= place {
                 self.cells.resize(place + 1, String::new());
             }
@@ -184,7 +214,11 @@ impl Table {
 
     /// Writes the row.
     fn end_row(&mut self) -> Result<(), SessionFileError> {
-        if self.is_writing {
+        self.next = 0;
+        if self.pass == Pass::Cells {
+            return Ok(());
+        }
+        if self.pass == Pass::Text {
             self.n_rows += 1;
             self.cells.resize(self.names.len().max(self.cells.len()), String::new());
             write_line(&mut self.rows, self.cells.iter().map(String::as_str));
@@ -194,7 +228,6 @@ impl Table {
             }
         }
         self.cells.iter_mut().for_each(String::clear);
-        self.next = 0;
         Ok(())
     }
 
@@ -244,6 +277,46 @@ impl Table {
             write_line(&mut text, self.columns.iter().map(|column| column.get(i)));
         }
         Ok(JsonTable { text, n_before: 1, layout: "a list of values for each column" })
+    }
+}
+
+/// Rows that are documents, such as the messages of a topic.
+pub(super) struct JsonMessages(Table);
+
+impl JsonMessages {
+    /// Messages of which the columns `names` are known.
+    pub(super) fn new(names: &[&str]) -> Self {
+        let mut table = Table { pass: Pass::Cells, ..Table::default() };
+        table.names = names.iter().map(|name| (*name).to_owned()).collect();
+        table.places = table.names.iter().cloned().zip(0..).collect();
+        Self(table)
+    }
+
+    /// The names of the values that messages had so far.
+    pub(super) fn names(&self) -> &[String] {
+        &self.0.names
+    }
+
+    /// Reads a message; returns its cells, in the order of the names.
+    ///
+    /// # Errors
+    /// The reason why it is not a row.
+    pub(super) fn read(&mut self, message: &[u8]) -> Result<&[String], String> {
+        let message = message.trim_ascii();
+        self.parse(message).or_else(|error| match with_quotes(message) {
+            Some(quoted) => self.parse(&quoted),
+            None => Err(error),
+        })?;
+        Ok(&self.0.cells)
+    }
+
+    fn parse(&mut self, message: &[u8]) -> Result<(), String> {
+        let Self(table) = self;
+        table.cells.iter_mut().for_each(String::clear);
+        table.next = 0;
+        let mut json = serde_json::Deserializer::from_slice(message);
+        let read = Row(table).deserialize(&mut json).and_then(|()| json.end());
+        read.map_err(|error| crate::json::words(&error))
     }
 }
 
@@ -378,7 +451,7 @@ impl Element<'_> {
         if self.column.ends.is_empty() && self.table.columns.len() == MAX_COLUMNS {
             return Err(E::custom(format!("more than {MAX_COLUMNS} columns")));
         }
-        if self.table.is_writing {
+        if self.table.pass == Pass::Text {
             let _ = write!(self.column.values, "{value}");
         }
         let end = u32::try_from(self.column.values.len()).map_err(E::custom)?;
@@ -550,11 +623,11 @@ mod tests {
         }
         assert_eq!(text("[[0,1],[0.1,2]]"), "0,1\n0.1,2\n");
         let indexed = r#"{"size":[0.2,0.2],"index":[0,1],"data":[[0,1],[0.1,2]]}"#;
-        assert_eq!(text(indexed), "0,1\n0.1,2\n", "numbers are no names");
+        assert_eq!(text(indexed), "0,1\n0.1,2\n", "numbers are not names");
     }
 
     #[test]
-    fn values_within_values_have_columns_of_their_own() {
+    fn values_within_values_have_their_own_columns() {
         let document = r#"[{"t":1767225600000000001,"ball":{"x":-0.0,"seen":true},"q":[1,[2,3]]}]"#;
         let expected =
             "t,ball.x,ball.seen,q[0],q[1][0],q[1][1]\n1767225600000000001,-0.0,true,1,2,3\n";

@@ -1,20 +1,23 @@
-//! Reads the samples of an MCAP file, record by record, from the topics with the schema of
-//! samples. Other topics are skipped; so is the index, which is not needed.
+//! Reads the messages of one topic of an MCAP file, record by record: those with the schema of
+//! samples, or else those of the only topic in JSON. Other topics are skipped; so is the index, which
+//! is not needed.
 
-use std::collections::BTreeSet;
-use std::io::{Read, Seek, SeekFrom};
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, Read, Seek};
 
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
 use super::byte_budget::ByteBudget;
+use super::json::JsonMessages;
 use super::mcap::SAMPLE_SCHEMA;
-use super::{
-    RejectedRow, RowPlace, SessionFileError, SessionFormat, SessionRowError, SessionRows, guarded,
+use super::shared_source::{SharedSource, SourceFrom};
+use super::{ColumnFile, SessionFileError, SessionFormat, TextRows, guarded};
+use crate::session_csv::COLUMNS;
+use crate::table::{
+    Cells, JUDGED_ROWS, NamedColumns, RowFault, RowSource, TableOptions, TableReader,
 };
-use crate::telemetry;
-use offbd_core::vocabulary::Sample;
 
 /// Longest record that is read, bytes; one is in memory at a time. Chosen: an attached file or
 /// picture may be long, a sample has two hundred. A file with a longer one is refused.
@@ -23,43 +26,57 @@ const MAX_RECORD_BYTES: usize = 16 << 20;
 /// Bytes before the contents of a record: what it is, and its length.
 const RECORD_HEAD_BYTES: u64 = 9;
 
+/// Messages in JSON by which the topic and its columns are found. Chosen: ten seconds at 100 Hz, so
+/// that a key which is absent at first is known.
+const FIRST_MESSAGES: usize = 1000;
+
+/// Bytes of these messages at most, beside the last one. Chosen: a thousand of 4 KiB.
+const FIRST_BYTES: usize = 4 << 20;
+
+/// The column with the time at which a message was logged, ns.
+const LOG_TIME: &str = "log_time";
+
 fn damaged(error: &McapError) -> SessionFileError {
     SessionFileError::Damaged { format: SessionFormat::Mcap, reason: error.to_string() }
 }
 
-/// The samples of an MCAP file.
-pub(super) struct McapRows<S> {
+/// A message in JSON.
+struct Message {
+    channel: u16,
+    log_time: u64,
+    data: Vec<u8>,
+}
+
+/// The messages in JSON of an MCAP file.
+struct Messages<S> {
     source: S,
     reader: LinearReader,
     schemas: BTreeSet<u16>,
-    channels: BTreeSet<u16>,
+    /// The topics of the channels with JSON, and whether they have the schema of samples.
+    channels: BTreeMap<u16, (String, bool)>,
     budget: ByteBudget,
-    n_read: u64,
-    has_ended: bool,
 }
 
-impl<S: Read + Seek> McapRows<S> {
-    pub(super) fn new(mut source: S) -> Result<Self, SessionFileError> {
-        let budget = ByteBudget::of_file(source.seek(SeekFrom::End(0))?);
-        source.rewind()?;
+impl<S: Read> Messages<S> {
+    fn new(source: S, n_bytes: u64) -> Self {
         let options = LinearReaderOptions::default()
             .with_validate_chunk_crcs(true)
             .with_record_length_limit(MAX_RECORD_BYTES);
-        Ok(Self {
+        Self {
             source,
             reader: LinearReader::new_with_options(options),
             schemas: BTreeSet::new(),
-            channels: BTreeSet::new(),
-            budget,
-            n_read: 0,
-            has_ended: false,
-        })
+            channels: BTreeMap::new(),
+            budget: ByteBudget::of_file(n_bytes),
+        }
     }
-}
 
-impl<S: Read> McapRows<S> {
-    /// Reads up to the next message that should be a sample; `None` at the end of the file.
-    fn advance(&mut self) -> Result<Option<Result<Sample, String>>, SessionFileError> {
+    /// Returns the next message; `None` at the end of the file.
+    fn next(&mut self) -> Result<Option<Message>, SessionFileError> {
+        guarded(SessionFormat::Mcap, || self.read())?
+    }
+
+    fn read(&mut self) -> Result<Option<Message>, SessionFileError> {
         while let Some(event) = self.reader.next_event() {
             match event.map_err(|error| damaged(&error))? {
                 LinearReadEvent::ReadRequest(n) => {
@@ -69,65 +86,186 @@ impl<S: Read> McapRows<S> {
                 LinearReadEvent::Record { data, opcode } => {
                     self.budget.spend(RECORD_HEAD_BYTES + data.len() as u64)?;
                     let record = parse_record(opcode, data).map_err(|error| damaged(&error))?;
-                    if let Some(row) = note(&mut self.schemas, &mut self.channels, &record) {
-                        return Ok(Some(row));
+                    let message = note(&mut self.schemas, &mut self.channels, record);
+                    if message.is_some() {
+                        return Ok(message);
                     }
                 }
             }
-        }
-        if self.channels.is_empty() {
-            return Err(SessionFileError::NoTopic(SAMPLE_SCHEMA));
         }
         Ok(None)
     }
 }
 
-/// Notes which channels have samples; returns the sample of a message of one of these.
+/// Notes which channels have JSON; returns a message of one of these.
 fn note(
     schemas: &mut BTreeSet<u16>,
-    channels: &mut BTreeSet<u16>,
-    record: &Record<'_>,
-) -> Option<Result<Sample, String>> {
+    channels: &mut BTreeMap<u16, (String, bool)>,
+    record: Record<'_>,
+) -> Option<Message> {
     match record {
         Record::Schema { header, .. } if header.name == SAMPLE_SCHEMA => {
             schemas.insert(header.id);
         }
-        Record::Channel(channel)
-            if schemas.contains(&channel.schema_id) && channel.message_encoding == "json" =>
-        {
-            channels.insert(channel.id);
+        Record::Channel(channel) if channel.message_encoding == "json" => {
+            let has_samples = schemas.contains(&channel.schema_id);
+            channels.insert(channel.id, (channel.topic, has_samples));
         }
-        Record::Message { header, data } if channels.contains(&header.channel_id) => {
-            return Some(telemetry::json_row(data));
+        Record::Message { header, data } if channels.contains_key(&header.channel_id) => {
+            let (channel, log_time) = (header.channel_id, header.log_time);
+            return Some(Message { channel, log_time, data: data.into_owned() });
         }
         _ => {}
     }
     None
 }
 
-impl<S: Read> Iterator for McapRows<S> {
-    type Item = Result<Sample, SessionRowError>;
+/// An MCAP file whose topic and columns are known.
+pub(super) struct McapTable<S> {
+    source: SharedSource<S>,
+    columns: NamedColumns,
+    topic: RowTopic,
+}
 
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.has_ended {
-            return None;
+/// Which messages are rows.
+#[derive(Clone)]
+enum RowTopic {
+    /// Those with the schema of samples.
+    Samples,
+    Named(String),
+}
+
+impl RowTopic {
+    /// Finds the topic of the rows.
+    fn of(channels: &BTreeMap<u16, (String, bool)>) -> Result<Self, SessionFileError> {
+        if channels.values().any(|(_, has_samples)| *has_samples) {
+            return Ok(Self::Samples);
         }
-        let row = guarded(SessionFormat::Mcap, || self.advance()).and_then(|row| row);
-        self.has_ended = !matches!(row, Ok(Some(_)));
-        match row {
-            Ok(row) => {
-                self.n_read += u64::from(row.is_some());
-                let place = RowPlace::Row(self.n_read);
-                let rejected = |reason| SessionRowError::Rejected(RejectedRow { place, reason });
-                row.map(|row| row.map_err(rejected))
+        let topics: BTreeSet<&str> = channels.values().map(|(topic, _)| topic.as_str()).collect();
+        let mut list = topics.iter();
+        let found = match (list.next(), list.next()) {
+            (Some(only), None) => return Ok(Self::Named((*only).to_owned())),
+            (None, _) => "no other topic in JSON".to_owned(),
+            (Some(_), Some(_)) => {
+                let topics: Vec<String> = topics.iter().map(|topic| format!("`{topic}`")).collect();
+                format!("several other topics in JSON, {}", topics.join(", "))
             }
-            Err(error) => Some(Err(SessionRowError::Unreadable(error))),
+        };
+        Err(SessionFileError::NoTopic { schema: SAMPLE_SCHEMA, found })
+    }
+
+    fn has(&self, (topic, has_samples): &(String, bool)) -> bool {
+        match self {
+            Self::Samples => *has_samples,
+            Self::Named(name) => topic == name,
+        }
+    }
+
+    /// The columns that are known before the first message.
+    fn names(&self) -> Vec<&'static str> {
+        match self {
+            Self::Samples => COLUMNS.into_iter().chain(["seq"]).collect(),
+            Self::Named(_) => Vec::new(),
         }
     }
 }
 
-impl<S: Read + Send> SessionRows for McapRows<S> {
-    fn place(&self) -> RowPlace {
-        RowPlace::Row(self.n_read)
+impl<S: Read + Seek + Send + 'static> McapTable<S> {
+    /// Finds the topic, and reads the first messages.
+    pub(super) fn open(source: S) -> Result<Self, SessionFileError> {
+        let source = SharedSource::new(source)?;
+        let mut messages = Messages::new(source.from(0), source.n_bytes());
+        let (mut first, mut n_bytes) = (Vec::new(), 0);
+        while first.len() < FIRST_MESSAGES
+            && n_bytes < FIRST_BYTES
+            && let Some(message) = messages.next()?
+        {
+            n_bytes += message.data.len();
+            first.push(message);
+        }
+        let topic = RowTopic::of(&messages.channels)?;
+        let mut json = JsonMessages::new(&topic.names());
+        let mut rows: Vec<(Vec<String>, String)> = Vec::new();
+        first.retain(|message| topic.has(&messages.channels[&message.channel]));
+        for Message { log_time, data, .. } in &first {
+            if let Ok(cells) = json.read(data)
+                && rows.len() < JUDGED_ROWS
+            {
+                rows.push((cells.to_vec(), log_time.to_string()));
+            }
+        }
+        let mut names = json.names().to_vec();
+        let row = |(mut cells, log_time): (Vec<String>, String)| {
+            cells.resize(names.len(), String::new());
+            cells.push(log_time);
+            cells
+        };
+        let first_rows = rows.into_iter().map(row).collect();
+        names.push(LOG_TIME.to_owned());
+        let columns = NamedColumns { names, first_rows };
+        Ok(Self { source, columns, topic })
+    }
+}
+
+impl<S: Read + Seek + Send + 'static> ColumnFile for McapTable<S> {
+    fn columns(&self) -> &NamedColumns {
+        &self.columns
+    }
+
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'static>, SessionFileError> {
+        let names: Vec<&str> = self.columns.names.iter().map(String::as_str).collect();
+        // The last column is the time of the log.
+        let names = names.split_last().map_or(&[][..], |(_, names)| names);
+        let rows = |_: &[usize]| {
+            Ok(McapRows {
+                n_names: names.len(),
+                messages: Some(Messages::new(self.source.from(0), self.source.n_bytes())),
+                topic: self.topic.clone(),
+                json: JsonMessages::new(names),
+                n_read: 0,
+            })
+        };
+        TableReader::of_columns(&self.columns, options, rows).map(TextRows::of_columns)
+    }
+}
+
+/// The rows of an MCAP file.
+struct McapRows<S: Read + Seek> {
+    /// `None` after an error.
+    messages: Option<Messages<io::BufReader<SourceFrom<S>>>>,
+    topic: RowTopic,
+    json: JsonMessages,
+    /// The values of a message that have a column.
+    n_names: usize,
+    n_read: u64,
+}
+
+impl<S: Read + Seek + Send> RowSource for McapRows<S> {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+        while let Some(messages) = &mut self.messages {
+            let message = match messages.next() {
+                Ok(Some(message)) => message,
+                end => {
+                    self.messages = None;
+                    return end.map(|_| false).map_err(RowFault::Unreadable);
+                }
+            };
+            if !self.topic.has(&messages.channels[&message.channel]) {
+                continue;
+            }
+            self.n_read += 1;
+            let row = self.json.read(&message.data).map_err(RowFault::Rejected)?;
+            cells.clear();
+            for i in 0..self.n_names {
+                cells.push_text(row.get(i).map_or("", String::as_str));
+            }
+            cells.push_text(&message.log_time.to_string());
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    fn line(&self) -> u64 {
+        self.n_read
     }
 }

@@ -73,7 +73,7 @@ impl RigScene {
             file.foxglove(RIG, sample.t_s, &rig_message(rig, sample.t_s))?;
         }
         if self.input(Input::Sample(*sample)) == Some(Admission::Unknown) {
-            // Rows as old as this are no retransmissions in a recording.
+            // Rows as old as this are not retransmissions in a recording.
             self.input(Input::NewSample(*sample));
         }
         self.write(file)
@@ -212,7 +212,7 @@ fn transform(
     }
 }
 
-/// The measured acceleration in blue and the twin's in green; unknown ones are no arrows.
+/// The measured acceleration in blue and the twin's in green; unknown ones are not drawn.
 fn twin_message(evidence: &Evidence, t_s: f64) -> SceneUpdate {
     let arrows = |id: &str, of: fn(&AxisEvidence) -> Option<f64>, color| {
         let (x, y) = (of(&evidence.axes.x), of(&evidence.axes.y));

@@ -3,15 +3,17 @@
 //! A file is written row group by row group, and read page by page. Before a file is read, the
 //! sizes of its pages are checked (`parquet_pages.rs`).
 
-use std::io::{self, Read, Seek, SeekFrom};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::io::{self, Read, Seek};
 
 use arrow_array::RecordBatch;
 use arrow_schema::{ArrowError, SchemaRef};
 use bytes::Bytes;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
+    ParquetRecordBatchReaderBuilder,
+};
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
@@ -20,10 +22,13 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::schema::types::ColumnPath;
 
-use super::columns::{self, BatchRows, SchemaIndices};
+use super::byte_budget::ByteBudget;
+use super::columns::{self, BatchRows};
 use super::parquet_pages;
-use super::{
-    RowPlace, SessionFileError, SessionFormat, SessionInfo, SessionRowError, SessionRows, guarded,
+use super::shared_source::{SharedSource, SourceFrom};
+use super::{ColumnFile, SessionFileError, SessionFormat, SessionInfo, TextRows, guarded};
+use crate::table::{
+    Cells, JUDGED_ROWS, NamedColumns, RowFault, RowSource, TableOptions, TableReader,
 };
 use offbd_core::vocabulary::Sample;
 
@@ -118,28 +123,94 @@ impl ParquetEncoder {
     }
 }
 
-/// Opens a Parquet file and checks its columns and the sizes of its pages.
-pub(super) fn rows<S: Read + Seek + Send + 'static>(
-    source: S,
-) -> Result<ParquetRows, SessionFileError> {
-    guarded(SessionFormat::Parquet, || open(source))?
+/// A Parquet file whose columns are known.
+pub(super) struct ParquetTable<S: Read + Seek + Send + 'static> {
+    source: SharedSource<S>,
+    metadata: ArrowReaderMetadata,
+    columns: NamedColumns,
 }
 
-fn open<S: Read + Seek + Send + 'static>(source: S) -> Result<ParquetRows, SessionFileError> {
-    let source = SharedSource::new(source)?;
-    source.check_footer()?;
-    let builder = ParquetRecordBatchReaderBuilder::try_new(source.clone()).map_err(damaged)?;
-    let indices = SchemaIndices::of(builder.schema())?;
-    let mask = ProjectionMask::roots(builder.parquet_schema(), indices.all());
-    let leaves =
-        (0..builder.parquet_schema().num_columns()).filter(|&leaf| mask.leaf_included(leaf));
-    parquet_pages::check(&source, builder.metadata(), &leaves.collect::<Vec<_>>())?;
-    let reader = builder.with_projection(mask).with_batch_size(BATCH_ROWS).build();
-    Ok(ParquetRows { reader: Some(reader.map_err(damaged)?), rows: BatchRows::new() })
+impl<S: Read + Seek + Send + 'static> ParquetTable<S> {
+    /// Reads the names and the first values of the columns.
+    pub(super) fn open(source: S) -> Result<Self, SessionFileError> {
+        guarded(SessionFormat::Parquet, || Self::read(source))?
+    }
+
+    fn read(source: S) -> Result<Self, SessionFileError> {
+        let source = SharedSource::new(source)?;
+        check_footer(&source)?;
+        let metadata = ArrowReaderMetadata::load(&source, ArrowReaderOptions::default());
+        let metadata = metadata.map_err(damaged)?;
+        let names = columns::names(metadata.schema());
+        let columns = NamedColumns { names, first_rows: Vec::new() };
+        let mut table = Self { source, metadata, columns };
+        let mut budget = ByteBudget::of_file(table.source.n_bytes());
+        let n_columns = table.columns.names.len();
+        let first: Vec<Vec<String>> =
+            (0..n_columns).map(|column| table.first_values(column, &mut budget)).collect();
+        table.columns.first_rows = columns::rows_of(&first);
+        Ok(table)
+    }
+
+    /// Returns the first values of a column; none if they are too large or damaged, which is an error
+    /// if the column is read.
+    fn first_values(&self, column: usize, budget: &mut ByteBudget) -> Vec<String> {
+        let Some(group) = self.metadata.metadata().row_groups().first() else { return Vec::new() };
+        if !columns::is_read(self.metadata.schema().field(column).data_type()) {
+            return Vec::new();
+        }
+        let (mask, leaves) = self.projection(&[column]);
+        if parquet_pages::check_group(&self.source, group, &leaves, budget).is_err() {
+            return Vec::new();
+        }
+        let builder = self.builder().with_projection(mask).with_row_groups(vec![0]);
+        let reader = builder.with_batch_size(JUDGED_ROWS).with_limit(JUDGED_ROWS).build();
+        match reader.map(|mut reader| reader.next()) {
+            Ok(Some(Ok(batch))) => columns::first_values(batch.column(0)),
+            _ => Vec::new(),
+        }
+    }
+
+    fn builder(&self) -> ParquetRecordBatchReaderBuilder<SharedSource<S>> {
+        let (source, metadata) = (self.source.clone(), self.metadata.clone());
+        ParquetRecordBatchReaderBuilder::new_with_metadata(source, metadata)
+    }
+
+    /// The mask of some columns, and the leaves that they have.
+    fn projection(&self, wanted: &[usize]) -> (ProjectionMask, Vec<usize>) {
+        let schema = self.metadata.parquet_schema();
+        let mask = ProjectionMask::roots(schema, wanted.iter().copied());
+        let leaves = (0..schema.num_columns()).filter(|&leaf| mask.leaf_included(leaf)).collect();
+        (mask, leaves)
+    }
+
+    /// Opens the rows, of which the columns `wanted` are read, and checks the sizes of their pages.
+    fn rows_of(&self, wanted: &[usize]) -> Result<ParquetRows, SessionFileError> {
+        columns::check(self.metadata.schema(), wanted)?;
+        let (mask, leaves) = self.projection(wanted);
+        parquet_pages::check(&self.source, self.metadata.metadata(), &leaves)?;
+        let reader = self.builder().with_projection(mask).with_batch_size(BATCH_ROWS).build();
+        let place = |column: usize| wanted.iter().position(|wanted| *wanted == column);
+        let places = (0..self.columns.names.len()).map(place).collect();
+        Ok(ParquetRows { reader: Some(reader.map_err(damaged)?), rows: BatchRows::new(places) })
+    }
+}
+
+impl<S: Read + Seek + Send + 'static> ColumnFile for ParquetTable<S> {
+    fn columns(&self) -> &NamedColumns {
+        &self.columns
+    }
+
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'static>, SessionFileError> {
+        let rows = |wanted: &[usize]| {
+            guarded(SessionFormat::Parquet, || self.rows_of(wanted)).and_then(|rows| rows)
+        };
+        TableReader::of_columns(&self.columns, options, rows).map(TextRows::of_columns)
+    }
 }
 
 /// The rows of a Parquet file.
-pub(super) struct ParquetRows {
+struct ParquetRows {
     /// `None` after the end, or an error.
     reader: Option<ParquetRecordBatchReader>,
     rows: BatchRows,
@@ -152,90 +223,45 @@ impl ParquetRows {
         let next = || self.reader.as_mut().and_then(Iterator::next).transpose();
         let batch = guarded(SessionFormat::Parquet, next)?;
         let Some(batch) = batch.map_err(unreadable)? else { return Ok(false) };
-        self.rows.set(batch)?;
+        self.rows.set(batch);
         Ok(true)
     }
 }
 
-impl Iterator for ParquetRows {
-    type Item = Result<Sample, SessionRowError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            if let Some(row) = self.rows.next() {
-                return Some(row);
-            }
-            match self.read() {
-                Ok(true) => {}
-                Ok(false) => {
-                    self.reader = None;
-                    return None;
-                }
-                Err(error) => {
-                    self.reader = None;
-                    return Some(Err(SessionRowError::Unreadable(error)));
-                }
+impl RowSource for ParquetRows {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+        while !self.rows.next(cells) {
+            let read = self.read();
+            if !matches!(read, Ok(true)) {
+                self.reader = None;
+                return read.map_err(RowFault::Unreadable);
             }
         }
+        Ok(true)
+    }
+
+    fn line(&self) -> u64 {
+        self.rows.n_read()
     }
 }
 
-impl SessionRows for ParquetRows {
-    fn place(&self) -> RowPlace {
-        self.rows.place()
+/// Checks that the file has an end, and that its footer is not too long.
+fn check_footer<S: Read + Seek>(source: &SharedSource<S>) -> Result<(), SessionFileError> {
+    let tail = source.read_at(source.n_bytes().saturating_sub(TAIL_BYTES), TAIL_BYTES as usize)?;
+    let Some((length, SIGNATURE)) = tail.split_first_chunk::<4>() else {
+        return Err(damaged("it does not end with its signature"));
+    };
+    let found = u64::from(u32::from_le_bytes(*length));
+    if found > MAX_FOOTER_BYTES {
+        let what = "the footer";
+        return Err(SessionFileError::TooLarge { what, found, limit: MAX_FOOTER_BYTES });
     }
-}
-
-/// A source that several readers read at their own positions.
-pub(super) struct SharedSource<S> {
-    source: Arc<Mutex<S>>,
-    n_bytes: u64,
-}
-
-impl<S> Clone for SharedSource<S> {
-    fn clone(&self) -> Self {
-        Self { source: self.source.clone(), n_bytes: self.n_bytes }
-    }
-}
-
-impl<S: Read + Seek> SharedSource<S> {
-    pub(super) fn new(mut source: S) -> io::Result<Self> {
-        let n_bytes = source.seek(SeekFrom::End(0))?;
-        Ok(Self { source: Arc::new(Mutex::new(source)), n_bytes })
-    }
-
-    pub(super) const fn n_bytes(&self) -> u64 {
-        self.n_bytes
-    }
-
-    /// Reads up to `n` bytes from `start` on; fewer only at the end of the source.
-    pub(super) fn read_at(&self, start: u64, n: usize) -> io::Result<Vec<u8>> {
-        let mut source = self.source.lock().unwrap_or_else(PoisonError::into_inner);
-        let n = (n as u64).min(self.n_bytes.saturating_sub(start));
-        source.seek(SeekFrom::Start(start))?;
-        let mut bytes = Vec::with_capacity(usize::try_from(n).unwrap_or_default());
-        source.by_ref().take(n).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    }
-
-    /// Checks that the file has an end, and that its footer is not too long.
-    fn check_footer(&self) -> Result<(), SessionFileError> {
-        let tail = self.read_at(self.n_bytes.saturating_sub(TAIL_BYTES), TAIL_BYTES as usize)?;
-        let Some((length, SIGNATURE)) = tail.split_first_chunk::<4>() else {
-            return Err(damaged("it does not end with its signature"));
-        };
-        let found = u64::from(u32::from_le_bytes(*length));
-        if found > MAX_FOOTER_BYTES {
-            let what = "the footer";
-            return Err(SessionFileError::TooLarge { what, found, limit: MAX_FOOTER_BYTES });
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 impl<S: Send> Length for SharedSource<S> {
     fn len(&self) -> u64 {
-        self.n_bytes
+        self.n_bytes()
     }
 }
 
@@ -243,7 +269,7 @@ impl<S: Read + Seek + Send> ChunkReader for SharedSource<S> {
     type T = io::BufReader<SourceFrom<S>>;
 
     fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
-        Ok(io::BufReader::new(SourceFrom { source: self.clone(), at: start }))
+        Ok(self.from(start))
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
@@ -252,20 +278,5 @@ impl<S: Read + Seek + Send> ChunkReader for SharedSource<S> {
             return Err(ParquetError::EOF(format!("{length} bytes are missing at byte {start}")));
         }
         Ok(bytes.into())
-    }
-}
-
-/// A source from a position on.
-pub(super) struct SourceFrom<S> {
-    source: SharedSource<S>,
-    at: u64,
-}
-
-impl<S: Read + Seek> Read for SourceFrom<S> {
-    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let bytes = self.source.read_at(self.at, buffer.len())?;
-        buffer[..bytes.len()].copy_from_slice(&bytes);
-        self.at += bytes.len() as u64;
-        Ok(bytes.len())
     }
 }

@@ -6,10 +6,10 @@
 
 use std::io::{Read, Seek};
 
-use parquet::file::metadata::ParquetMetaData;
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
 use super::byte_budget::ByteBudget;
-use super::parquet::SharedSource;
+use super::shared_source::SharedSource;
 use super::{SessionFileError, SessionFormat};
 
 /// Longest page that is read, bytes, before and after its compression. Chosen: most programs
@@ -35,14 +35,28 @@ pub(super) fn check<S: Read + Seek>(
     leaves: &[usize],
 ) -> Result<(), SessionFileError> {
     let mut budget = ByteBudget::of_file(source.n_bytes());
-    for group in metadata.row_groups() {
-        for chunk in leaves.iter().filter_map(|&leaf| group.columns().get(leaf)) {
-            let (start, length) = (page_start(chunk), chunk.compressed_size());
-            let (Ok(start), Ok(length)) = (u64::try_from(start), u64::try_from(length)) else {
-                return Err(damaged("a column has a negative position"));
-            };
-            check_chunk(source, start, start.saturating_add(length), &mut budget)?;
-        }
+    metadata
+        .row_groups()
+        .iter()
+        .try_for_each(|group| check_group(source, group, leaves, &mut budget))
+}
+
+/// Checks the pages of the columns `leaves` in a row group.
+///
+/// # Errors
+/// As of [`check`].
+pub(super) fn check_group<S: Read + Seek>(
+    source: &SharedSource<S>,
+    group: &RowGroupMetaData,
+    leaves: &[usize],
+    budget: &mut ByteBudget,
+) -> Result<(), SessionFileError> {
+    for chunk in leaves.iter().filter_map(|&leaf| group.columns().get(leaf)) {
+        let (start, length) = (page_start(chunk), chunk.compressed_size());
+        let (Ok(start), Ok(length)) = (u64::try_from(start), u64::try_from(length)) else {
+            return Err(damaged("a column has a negative position"));
+        };
+        check_chunk(source, start, start.saturating_add(length), budget)?;
     }
     Ok(())
 }

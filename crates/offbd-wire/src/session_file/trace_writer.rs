@@ -22,7 +22,6 @@ impl TraceWriter {
     /// # Errors
     /// [`SessionFileError::NotBuilt`]; [`SessionFileError::NotWritten`] for another format;
     /// [`SessionFileError::Write`].
-    #[cfg_attr(not(feature = "parquet"), expect(unused_variables))]
     pub fn new(
         format: SessionFormat,
         info: &SessionInfo,

@@ -3,7 +3,7 @@
 use jiff::civil::{Date, Time};
 
 /// Words for a missing number, as programs write them.
-const MISSING: [&str; 9] = ["nan", "na", "n/a", "none", "null", "nil", "-", "--", "?"];
+const MISSING: [&str; 10] = ["nan", "na", "n/a", "#n/a", "none", "null", "nil", "-", "--", "?"];
 
 /// Characters around a value that are not a part of it.
 fn is_margin(byte: u8) -> bool {
@@ -43,6 +43,15 @@ pub(super) fn is_value(cell: &str, has_decimal_commas: bool) -> bool {
             .is_some()
 }
 
+/// Splits a cell such as `x:0.1` or `x = 0.1` into the name of its column and its value.
+pub(super) fn labelled(cell: &str) -> Option<(&str, &str)> {
+    let (label, value) = cell.split_once([':', '='])?;
+    let (label, value) = (label.trim(), value.trim_start());
+    let is_number = |has_commas| is_value(value.trim_end(), has_commas);
+    let is_name = label.starts_with(char::is_alphabetic);
+    (is_name && (is_number(false) || is_number(true))).then_some((label, value))
+}
+
 /// Parses a number; `None` if it is missing.
 ///
 /// # Errors
@@ -55,8 +64,21 @@ pub(super) fn parse(cell: &[u8], has_decimal_commas: bool) -> Result<Option<f64>
         Ok(value) if f64::is_finite(value) => Ok(Some(value)),
         _ if is_missing(text) => Ok(None),
         Ok(_) => Err(format!("`{text}` is not finite")),
+        Err(_) if is_ambiguous_date(text) => Err(format!(
+            "`{text}` is a date whose day and month cannot be told apart; write 2026-02-20"
+        )),
         Err(_) => Err(format!("`{text}` is not a number")),
     }
+}
+
+/// Whether a text begins with a date such as `02/03/2026`.
+fn is_ambiguous_date(text: &str) -> bool {
+    let date = text.split([' ', 'T']).next().unwrap_or_default();
+    let parts: Vec<&str> = date.split(['/', '-']).collect();
+    let is_number = |part: &&str, longest: usize| {
+        (1..=longest).contains(&part.len()) && part.bytes().all(|b| b.is_ascii_digit())
+    };
+    matches!(&parts[..], [a, b, year] if is_number(a, 2) && is_number(b, 2) && is_number(year, 4))
 }
 
 /// Whether a cell is a date, a time of day, or both.
@@ -149,6 +171,8 @@ mod tests {
             assert!(parse(text.as_bytes(), false).unwrap_err().contains("not a number"), "{text}");
         }
         assert_eq!(parse(b"\xff", false), Err("not UTF-8".to_owned()));
+        let date = parse(b"02/03/2026 13:51:00", false).unwrap_err();
+        assert!(date.contains("day and month cannot be told apart"), "{date}");
     }
 
     /// Seconds since 1970 by `date --utc --date=… +%s`.

@@ -9,7 +9,7 @@ use super::rows::Cells;
 const WRAPS: [f64; 2] = [65_536.0, 4_294_967_296.0];
 
 /// A counter wraps if it goes on by at most this many of its last steps. Chosen: a second of lost
-/// rows at 100 Hz is no new run.
+/// rows at 100 Hz is not a new run.
 const MOST_STEPS: f64 = 100.0;
 
 /// A clock starts again if it falls by more than this, s, to within this of the run's first time.

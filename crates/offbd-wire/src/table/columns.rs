@@ -60,11 +60,13 @@ impl BoundColumns {
             let value = match column {
                 None => *factor,
                 Some(column) => {
-                    let bytes = cells.get(*column);
-                    let bytes = bytes.ok_or_else(|| format!("no field `{}`", self.name))?;
-                    let value = cell::parse(bytes, has_decimal_commas)
-                        .map_err(|reason| format!("`{}`: {reason}", self.name))?;
-                    let Some(value) = value else { return Ok(None) };
+                    let value = match cells.number(*column) {
+                        Some(value) => value,
+                        None => match self.parsed(cells, *column, has_decimal_commas)? {
+                            Some(value) => value,
+                            None => return Ok(None),
+                        },
+                    };
                     // A factor of 1 keeps the bits of the number.
                     if *factor == 1.0 { value } else { value * factor }
                 }
@@ -72,6 +74,22 @@ impl BoundColumns {
             sum = Some(sum.map_or(value, |sum| sum + value));
         }
         Ok(sum)
+    }
+
+    /// Parses a cell of text.
+    fn parsed(
+        &self,
+        cells: &Cells,
+        column: usize,
+        has_decimal_commas: bool,
+    ) -> Result<Option<f64>, String> {
+        let bytes = cells.get(column).ok_or_else(|| format!("no field `{}`", self.name))?;
+        cell::parse(bytes, has_decimal_commas)
+            .map_err(|reason| format!("`{}`: {reason}", self.name))
+    }
+
+    fn columns(&self) -> impl Iterator<Item = usize> {
+        self.terms.iter().filter_map(|term| term.column)
     }
 }
 
@@ -167,6 +185,20 @@ impl BoundMapping {
             (None, rate) => TimeSource::Rows(1.0 / rate.unwrap_or(1.0)),
         };
         Ok(Self { time, quantities, seq: find(dialect, "seq")? })
+    }
+
+    /// The columns that are read.
+    pub(super) fn columns(&self) -> Vec<usize> {
+        let mut columns: Vec<usize> = match &self.time {
+            TimeSource::Columns(columns) => columns.columns().collect(),
+            TimeSource::Moments(columns) => columns.clone(),
+            TimeSource::Rows(_) => Vec::new(),
+        };
+        columns.extend(self.quantities.iter().flatten().flat_map(BoundColumns::columns));
+        columns.extend(self.seq);
+        columns.sort_unstable();
+        columns.dedup();
+        columns
     }
 }
 

@@ -11,9 +11,9 @@ pub(super) const HEAD_BYTES: usize = 64 << 10;
 /// Lines that are looked at.
 const HEAD_LINES: usize = 1000;
 
-/// Rows after the header by which a separator is judged. Chosen: enough that a line of text that
+/// Rows after the header by which a separator and units are judged. Chosen: enough that a line of text that
 /// happens to have as many cells does not decide.
-const JUDGED_ROWS: usize = 20;
+pub(crate) const JUDGED_ROWS: usize = 20;
 
 /// Separators of columns. Blanks separate if none of the others makes a table that early.
 const SEPARATORS: [u8; 4] = [b',', b';', b'\t', b'|'];
@@ -31,6 +31,8 @@ pub(super) struct Dialect {
     pub(super) comment: Option<u8>,
     /// The names of the columns; empty if the file has none.
     pub(super) names: Vec<String>,
+    /// Whether each cell has the name of its column before its value, as in `t:0.1 x:0.2`.
+    pub(super) has_labels: bool,
     /// The units that a line below the names has, one for each column; empty without such a line.
     pub(super) units: Vec<String>,
     /// Lines, and their bytes, before the first row.
@@ -43,10 +45,36 @@ pub(super) struct Dialect {
 }
 
 impl Dialect {
+    /// The columns of a table that is not a text.
+    pub(super) fn of_columns(columns: &NamedColumns) -> Self {
+        let NamedColumns { names, first_rows } = columns;
+        Self {
+            separator: b',',
+            has_decimal_commas: false,
+            comment: None,
+            names: names.clone(),
+            has_labels: false,
+            units: Vec::new(),
+            n_lines: 0,
+            n_bytes: 0,
+            n_preamble: 0,
+            first_rows: first_rows.clone(),
+        }
+    }
+
     /// Number of columns.
     pub(super) fn n_columns(&self) -> usize {
         self.names.len().max(self.first_rows.first().map_or(0, Vec::len))
     }
+}
+
+/// The columns of a table that is not a text.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NamedColumns {
+    /// Their names, whatever these are.
+    pub(crate) names: Vec<String>,
+    /// The first rows as text, at most [`JUDGED_ROWS`].
+    pub(crate) first_rows: Vec<Vec<String>>,
 }
 
 /// A line of the head.
@@ -78,7 +106,7 @@ fn lines(head: &[u8], is_whole: bool) -> Vec<Line<'_>> {
             None if is_whole => head.len(),
             None => break,
         };
-        // A line that is not UTF-8 is no header; its rows are reported when they are read.
+        // A line that is not UTF-8 is not a header; its rows are reported when they are read.
         let text = std::str::from_utf8(&head[start..end]).unwrap_or("\u{fffd}");
         lines.push(Line { text: text.trim_end_matches(['\r', '\n']), end });
         start = end;
@@ -110,6 +138,21 @@ fn bare(cell: &str) -> &str {
     cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')).unwrap_or(cell).trim()
 }
 
+/// Whether the row below the names has only words; a column without a name has no unit.
+fn are_units(names: &[String], row: &[String], is_value: impl Fn(&String) -> bool) -> bool {
+    let is_named = |i: usize| names.get(i).is_some_and(|name| !name.is_empty());
+    row.iter().enumerate().all(|(i, cell)| match cell.is_empty() {
+        true => !is_named(i),
+        false => !is_value(cell) && !cell::is_moment(cell),
+    })
+}
+
+/// Whether two rows have as many cells, but for an empty one behind the last separator of one.
+fn is_as_wide(one: &[String], other: &[String]) -> bool {
+    let (longer, n) = if one.len() > other.len() { (one, other.len()) } else { (other, one.len()) };
+    longer.len() == n || longer.len() == n + 1 && longer[n].is_empty()
+}
+
 /// A table as one separator makes it.
 struct Candidate {
     separator: u8,
@@ -134,8 +177,8 @@ impl Candidate {
             .map(|(i, line)| (i, cells(line.text, separator)))
             .collect();
         let is_table = |i: usize| {
-            let n = rows[i].1.len();
-            n >= 2 && rows.get(i + 1).is_none_or(|(_, next)| next.len() == n)
+            let row = &rows[i].1;
+            row.len() >= 2 && rows.get(i + 1).is_none_or(|(_, next)| is_as_wide(row, next))
         };
         let first = (0..rows.len()).find(|i| is_table(*i))?;
         let mut rest = rows.into_iter().skip(first);
@@ -171,7 +214,7 @@ impl Candidate {
     /// blanks, then more rows of its width, more numbers, more columns.
     fn rank(&self) -> (usize, bool, usize, usize, usize) {
         let n = self.header.len();
-        let n_even = self.rows.iter().filter(|(_, row)| row.len() == n).count();
+        let n_even = self.rows.iter().filter(|(_, row)| is_as_wide(&self.header, row)).count();
         let has_commas = self.has_decimal_commas();
         let is_number = |cell: &&String| cell::is_value(cell, has_commas);
         let n_numbers = self.rows.iter().flat_map(|(_, row)| row).filter(is_number).count();
@@ -192,7 +235,31 @@ impl Candidate {
         has(',') && !has('.')
     }
 
-    fn dialect(self, lines: &[Line<'_>], comment: Option<u8>) -> Dialect {
+    /// Takes the names from the cells, if each of a column begins with the same one.
+    fn take_labels(&mut self) -> Option<Vec<String>> {
+        let parts = |row: &[String]| -> Option<(Vec<String>, Vec<String>)> {
+            let parts = row.iter().map(|cell| cell::labelled(cell));
+            let owned = |(label, value): (&str, &str)| (label.to_owned(), value.to_owned());
+            Some(
+                parts
+                    .map(|parts| parts.map(owned))
+                    .collect::<Option<Vec<_>>>()?
+                    .into_iter()
+                    .unzip(),
+            )
+        };
+        let (labels, first) = parts(&self.header)?;
+        let rows = self.rows.iter().map(|(line, row)| {
+            let (own, values) = parts(row)?;
+            (own == labels).then_some((*line, values))
+        });
+        self.rows = rows.collect::<Option<_>>()?;
+        self.header = first;
+        Some(labels)
+    }
+
+    fn dialect(mut self, lines: &[Line<'_>], comment: Option<u8>) -> Dialect {
+        let labels = self.take_labels();
         let has_decimal_commas = self.has_decimal_commas();
         let is_value = |cell: &String| cell::is_value(cell, has_decimal_commas);
         let n_preamble = lines[..self.start].iter().filter(|line| {
@@ -200,15 +267,15 @@ impl Candidate {
             !is_blank(line.text) && (first.is_none() || first != comment)
         });
         let n_preamble = n_preamble.count();
-        let is_named = self.is_commented || !self.header.iter().all(is_value);
+        let is_named = labels.is_none() && (self.is_commented || !self.header.iter().all(is_value));
         let mut rows = self.rows;
         let mut units = Vec::new();
         let mut before = self.start + usize::from(is_named);
         if !is_named {
             rows.insert(0, (self.start, self.header.clone()));
         } else if let Some((line, row)) = rows.first()
-            && row.len() == self.header.len()
-            && row.iter().all(|cell| !cell.is_empty() && !is_value(cell) && !cell::is_moment(cell))
+            && is_as_wide(&self.header, row)
+            && are_units(&self.header, row, is_value)
         {
             before = line + 1;
             units = rows.remove(0).1;
@@ -217,7 +284,8 @@ impl Candidate {
             separator: self.separator,
             has_decimal_commas,
             comment,
-            names: if is_named { self.header } else { Vec::new() },
+            has_labels: labels.is_some(),
+            names: if is_named { self.header } else { labels.unwrap_or_default() },
             units,
             n_lines: before,
             n_bytes: before.checked_sub(1).map_or(0, |last| lines[last].end),
@@ -255,12 +323,37 @@ mod tests {
     }
 
     #[test]
+    fn names_before_each_value_are_found() {
+        for text in [
+            "t:0.1 qx:-0.2 x:nan\nt:0.2 qx:0 x:1e-3\n",
+            "ready\nt:0.1,qx:-0.2,x:\nt:0.2,qx:0,x:1\n",
+            "t = 0.1; qx = -0.2; x = 3\nt = 0.2; qx = 0; x = 4\n",
+        ] {
+            let found = of(text);
+            assert!(found.has_labels, "{text}");
+            assert_eq!(found.names, ["t", "qx", "x"], "{text}");
+            assert_eq!(found.first_rows[0][..2], ["0.1", "-0.2"], "{text}");
+            assert_eq!(found.first_rows.len(), 2, "{text}");
+        }
+        for text in
+            ["t:s,x:m\n0,1\n", "13:51:00,1\n13:51:01,2\n", "t:0,x:1\nt:0,y:1\n", "t:0 x:1\nt:0 1\n"]
+        {
+            assert!(!of(text).has_labels, "{text}");
+        }
+    }
+
+    #[test]
     fn what_stands_before_the_rows_is_skipped() {
         let found = of("Rig 3, run 7\nDate: Monday\n\nt,x\ns,mm\n# begun\n0,1\n1,2\n");
         assert_eq!(found.names, ["t", "x"]);
         assert_eq!(found.units, ["s", "mm"]);
         assert_eq!((found.n_lines, found.n_bytes, found.n_preamble), (5, 36, 2));
         assert_eq!(found.comment, Some(b'#'));
+        for text in ["t,x\n0,1,\n1,2,\n", "t,x,\n0,1\n1,2\n", "t,x,\ns,m,\n0,1,\n"] {
+            let found = of(text);
+            assert_eq!(found.names[..2], ["t", "x"], "{text}");
+            assert_eq!(found.first_rows[0][..2], ["0", "1"], "{text}");
+        }
         let found = of("# offbd\n# t x\n0 1\n1 2\n");
         assert_eq!((found.names, found.n_lines), (vec!["t".to_owned(), "x".to_owned()], 2));
         let found = of("1879.0\t1988.0\n1940.0\t2083.0\n");

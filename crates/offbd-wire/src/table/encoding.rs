@@ -51,6 +51,17 @@ pub(super) fn as_utf8<'a>(
     Box::new(BufReader::with_capacity(BLOCK_BYTES, decoded))
 }
 
+/// A text whose lines end with a carriage return alone, as old programs write it, with line feeds.
+pub(super) struct WithLines<R>(pub(super) R);
+
+impl<R: Read> Read for WithLines<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let n = self.0.read(buffer)?;
+        buffer[..n].iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+        Ok(n)
+    }
+}
+
 /// Decodes while it is read.
 struct Decoded<R> {
     source: R,

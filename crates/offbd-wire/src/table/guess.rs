@@ -148,7 +148,7 @@ const COMMANDS: [&str; 21] = [
     "cmd", "command", "u", "mv", "tilt", "angle", "servo", "motor", "mot", "theta", "winkel", "q",
     "neigung", "control", "output", "out", "plate", "servox", "servoy", "motx", "moty",
 ];
-const POSITIONS: [(&str, usize); 16] = [
+const POSITIONS: [(&str, usize); 14] = [
     ("x", 0),
     ("bx", 0),
     ("px", 0),
@@ -156,7 +156,6 @@ const POSITIONS: [(&str, usize); 16] = [
     ("ballx", 0),
     ("xpos", 0),
     ("xball", 0),
-    ("position", 0),
     ("y", 1),
     ("by", 1),
     ("py", 1),
@@ -164,13 +163,19 @@ const POSITIONS: [(&str, usize); 16] = [
     ("bally", 1),
     ("ypos", 1),
     ("yball", 1),
-    ("distance", 0),
 ];
+/// Positions of a beam, unless another word says the axis.
+const DISTANCES: [(&str, usize); 2] = [("position", 0), ("distance", 0)];
 /// Words of quantities that are none of a sample.
 const OTHERS: [&str; 20] = [
     "dot", "xdot", "ydot", "v", "vx", "vy", "vel", "velocity", "acc", "ax", "ay", "err", "error",
     "ex", "ey", "ref", "sp", "setpoint", "target", "dt",
 ];
+
+/// Words of values that are neither lengths nor angles: they need a factor and an offset. The first
+/// one is a position by itself.
+const COUNTS: [&str; 11] =
+    ["px", "pix", "pixel", "pixels", "adc", "raw", "count", "counts", "tick", "ticks", "pwm"];
 
 /// Words of units as they stand in names and below them, each with the unit of a mapping.
 const UNIT_WORDS: [(&str, &str); 24] = [
@@ -254,10 +259,31 @@ fn meaning(name: &str) -> Option<Meaning> {
         };
         return Some(Meaning::Push(axis));
     }
-    if let Some(axis) = axis(&POSITIONS) {
+    if let Some(axis) = axis(&POSITIONS).or_else(|| axis(&DISTANCES)) {
         return Some(Meaning::Position(axis));
     }
     has(&TIMES).then_some(Meaning::Time)
+}
+
+/// Whether a column's name says that it holds pixels or counts.
+fn are_counts(name: &str) -> bool {
+    let words = words(name);
+    let known = if words.len() > 1 { &COUNTS[..] } else { &COUNTS[1..] };
+    words.iter().any(|word| known.contains(&word.as_str()))
+}
+
+/// What a column's name says that it holds in a unit.
+fn meaning_in_unit(name: &str) -> Option<Meaning> {
+    meaning(name).filter(|meaning| *meaning == Meaning::Time || !are_counts(name))
+}
+
+/// Returns the columns of commands and positions in pixels or counts that `mapping` does not use.
+pub(super) fn counts(dialect: &Dialect, mapping: &ColumnMapping) -> Vec<ColumnName> {
+    let terms = || mapping.expressions.iter().flatten().flat_map(|e| &e.terms);
+    let names = dialect.names.iter().enumerate();
+    let counts = names.filter(|(_, name)| meaning(name) != meaning_in_unit(name));
+    let columns = counts.map(|(i, _)| name(dialect, i));
+    columns.filter(|name| terms().all(|term| term.column.as_ref() != Some(name))).collect()
 }
 
 /// A guess, with its reason.
@@ -287,7 +313,8 @@ pub(super) fn name(dialect: &Dialect, column: usize) -> ColumnName {
 
 /// Guesses the columns of the quantities that `known` does not map.
 pub(super) fn guesses(dialect: &Dialect, known: &ColumnMapping) -> Vec<Guess> {
-    let meanings: Vec<Option<Meaning>> = dialect.names.iter().map(|name| meaning(name)).collect();
+    let meanings: Vec<Option<Meaning>> =
+        dialect.names.iter().map(|name| meaning_in_unit(name)).collect();
     let mut taken: Vec<usize> = Vec::new();
     let mut guesses = Vec::new();
     // The order in which columns are taken: what a name says most surely first.
@@ -320,8 +347,17 @@ pub(super) fn guesses(dialect: &Dialect, known: &ColumnMapping) -> Vec<Guess> {
             };
             (0..dialect.names.len()).find(|i| is_time(i).is_some())
         };
+        // Of two commands whose names say no axis, such as `servo_1` and `servo_2`.
+        let second_of_two = || {
+            let mut all = (0..meanings.len()).filter(|i| meanings[*i] == Some(Meaning::Push(None)));
+            let (first, second) = (all.next()?, all.next()?);
+            let without_number = |i: usize| dialect.names[i].trim_end_matches(char::is_numeric);
+            let alike = without_number(first) == without_number(second);
+            (alike && all.next().is_none()).then_some(second)
+        };
         let found = if quantity == 0 { time_by_unit() } else { None };
-        if let Some(column) = found.or_else(|| meanings_wanted.iter().find_map(has)) {
+        let found = found.or_else(|| meanings_wanted.iter().find_map(has));
+        if let Some(column) = found.or_else(|| second_of_two().filter(|_| quantity == 1)) {
             taken.push(column);
             guesses.push(Guess { quantity, column, unit: "", reason: String::new() });
         }
@@ -347,6 +383,11 @@ impl Guess {
     /// Whether the file states the unit.
     pub(super) fn is_stated(&self) -> bool {
         [BY_NAME, BY_UNIT_LINE].contains(&self.reason.as_str())
+    }
+
+    /// Whether only the size of the values speaks for the unit.
+    fn is_by_size(&self) -> bool {
+        self.quantity != 0 && !self.is_stated()
     }
 }
 
@@ -405,20 +446,37 @@ pub(super) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMappin
 /// guessed.
 pub(super) fn proposal(dialect: &Dialect, known: &ColumnMapping) -> String {
     let (mapping, guesses) = mapping(dialect, known);
-    let proposed = ColumnMapping {
-        expressions: std::array::from_fn(|i| {
-            let is_guessed = guesses.iter().any(|guess| guess.quantity == i);
-            mapping.expressions[i].clone().filter(|_| is_guessed || known.expressions[i].is_some())
-        }),
-    };
     if guesses.is_empty() {
         return format!(
             " A mapping says which column is what, such as `t_s=NAME/ms, x_m=NAME/mm`; the \
-             quantities are {}",
+             quantities are {}. A file without a time needs its rate",
             COLUMNS.join(", ")
         );
     }
-    format!(" This mapping is likely; check its units: `{proposed}`")
+    let mut has_unit = true;
+    let parts = COLUMNS.iter().enumerate().filter_map(|(i, quantity)| {
+        let expression = match guesses.iter().find(|guess| guess.quantity == i) {
+            // The motion may decide otherwise, which an error has no time to look at.
+            Some(guess) if guess.is_by_size() => {
+                has_unit = false;
+                format!("{}/UNIT", name(dialect, guess.column))
+            }
+            Some(_) => mapping.expressions[i].as_ref()?.text(i),
+            None => known.expressions[i].as_ref()?.text(i),
+        };
+        Some(format!("{quantity}={expression}"))
+    });
+    let parts = parts.collect::<Vec<_>>().join(", ");
+    // Names such as `MV_x` leave open which of two commands moves the ball along which axis.
+    let has_two = [1, 2].iter().all(|i| guesses.iter().any(|guess| guess.quantity == *i));
+    let units = match (has_unit, has_two) {
+        (true, _) => "",
+        (false, false) => "; `offbd inspect` proposes each UNIT by the motion",
+        (false, true) => {
+            "; `offbd inspect` proposes each UNIT, and which command is which, by the motion"
+        }
+    };
+    format!(" This mapping is likely: `{parts}`{units}")
 }
 
 #[cfg(test)]
@@ -455,9 +513,24 @@ mod tests {
                 "cmdX,cmdY,ballX,ballY\n0.1,0.1,0.01,0.01\n",
                 "cmd_qx_rad=cmdY/rad, cmd_qy_rad=cmdX/rad, x_m=ballX/m, y_m=ballY/m",
             ),
+            (
+                "t_s,qx,qy,ball/position/x,ball/position/y\n0,0.1,0.1,0.01,0.01\n",
+                "t_s=#1/s, cmd_qx_rad=qx/rad, cmd_qy_rad=qy/rad, x_m='ball/position/x'/m, y_m='ball/position/y'/m",
+            ),
             ("0,1,2\n1,2,3\n", ""),
+            ("t_ms,px,py\n0,0.1,0.2\n10,0.1,0.2\n", "t_s=t_ms/ms, x_m=px/m, y_m=py/m"),
+            ("t_ms,ball_x_px,adc_y,servo_raw\n0,320,200,512\n10,320,200,512\n", "t_s=t_ms/ms"),
         ] {
             assert_eq!(guessed(text), mapping, "{text}");
         }
+    }
+
+    #[test]
+    fn an_error_proposes_no_unit_that_only_the_size_speaks_for() {
+        let text = "time,x,y [mm],roll\n895.71,2.09,51,0.1\n895.73,2.1,50,0.1\n";
+        let dialect = detect(text.as_bytes(), true).unwrap();
+        let proposed = proposal(&dialect, &ColumnMapping::default());
+        let mapping = "t_s=time/s, cmd_qx_rad=roll/UNIT, x_m=x/UNIT, y_m='y [mm]'/mm";
+        assert!(proposed.contains(mapping), "{proposed}");
     }
 }

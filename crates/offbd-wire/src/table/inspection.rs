@@ -7,12 +7,13 @@ use std::io::{Read, Seek};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::dialect::Dialect;
 use super::expression::ColumnMapping;
 use super::{CsvError, OpenedTable, TableOptions, find_table, guess};
 use crate::session_csv::COLUMNS;
 use crate::session_file::{
-    self, HEAD_BYTES, SessionFileError, SessionFormat, SessionRowError, SessionRows, TextKind,
-    TextRows,
+    self, ColumnFile, HEAD_BYTES, SessionFileError, SessionFormat, SessionRowError, SessionRows,
+    TextKind, TextRows,
 };
 use crate::telemetry::{SampleView, sample_view};
 use offbd_core::vocabulary::Sample;
@@ -89,7 +90,7 @@ pub struct InspectionView {
     pub format: String,
     /// How a text is written: encoding, separator, decimal commas, lines before the table.
     pub layout: Vec<String>,
-    /// The columns of a text.
+    /// The columns of the table.
     pub columns: Vec<InspectedColumnView>,
     /// The mapping by which the rows were read, to be given as `columns`; empty if the columns
     /// have the names of the quantities.
@@ -122,7 +123,7 @@ pub struct InspectionView {
     pub motion: InspectedMotionView,
 }
 
-/// Inspects a recording in any format that is read; `options` maps columns of a text.
+/// Inspects a recording in any format that is read; `options` maps its columns.
 ///
 /// # Errors
 /// [`SessionFileError`] if the file cannot be read or has no rows, or `options` name a
@@ -150,10 +151,9 @@ pub fn inspect(
         return inspect_text(view, &kind, std::io::Cursor::new(table.text), options);
     }
     if format != SessionFormat::Csv {
-        let rows = &mut *session_file::open(source, Some(format), options)?;
-        let samples = read(&mut view, rows)?;
-        show(&mut view, &samples, |quantity| (Some(COLUMNS[quantity].to_owned()), None));
-        return Ok(view);
+        let mut file = session_file::column_file(source, format)?;
+        let dialect = Dialect::of_columns(file.columns());
+        return inspect_table(view, &dialect, &mut *file, options);
     }
     inspect_text(view, &TextKind::Text, source, options)
 }
@@ -171,19 +171,60 @@ fn inspect_text(
     layout(&mut view, &table);
     let dialect = table.dialect.clone();
     drop(table);
-    let options = &options.of_table(&dialect);
-    let (mut mapping, mut guesses) = guess::mapping(&dialect, &options.columns);
+    inspect_table(view, &dialect, &mut Text { kind, source }, options)
+}
+
+/// A table that is read more than once.
+trait Reopened {
+    /// Opens the rows by `options`.
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'_>, SessionFileError>;
+}
+
+struct Text<'a, S> {
+    kind: &'a TextKind,
+    source: S,
+}
+
+impl<S: Read + Seek + Send> Reopened for Text<'_, S> {
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'_>, SessionFileError> {
+        self.source.rewind()?;
+        TextRows::new(self.kind.clone(), &mut self.source, options)
+    }
+}
+
+impl Reopened for dyn ColumnFile {
+    fn rows(&mut self, options: &TableOptions) -> Result<TextRows<'_>, SessionFileError> {
+        ColumnFile::rows(self, options)
+    }
+}
+
+fn inspect_table(
+    mut view: InspectionView,
+    dialect: &Dialect,
+    table: &mut (impl Reopened + ?Sized),
+    options: &TableOptions,
+) -> Result<InspectionView, SessionFileError> {
+    columns(&mut view, dialect);
+    let options = &options.of_table(dialect);
+    let (mut mapping, mut guesses) = guess::mapping(dialect, &options.columns);
     let mut rate_hz = options.rate_hz;
     if mapping.expressions[0].is_none() && rate_hz.is_none() {
         view.remark("there is no time; give the rate, in rows a second");
         rate_hz = Some(1.0);
     }
-    let mut samples = read_table(&mut view, kind, &mut source, &mapping, rate_hz)?;
+    let counts = guess::counts(dialect, &mapping);
+    if let Some(first) = counts.first() {
+        let all = counts.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        view.remark(format!(
+            "pixels and counts need a factor and an offset, such as `x_m={first}*0.0005-0.16`: {all}"
+        ));
+    }
+    let mut samples = read_table(&mut view, table, &mapping, rate_hz)?;
     let before = mapping.clone();
     check::by_motion(&mut view, &dialect.names, &mut mapping, &mut guesses, &samples);
     if mapping != before {
         view.forget_rows();
-        samples = read_table(&mut view, kind, &mut source, &mapping, rate_hz)?;
+        samples = read_table(&mut view, table, &mapping, rate_hz)?;
     }
     if !(options.columns.is_empty() && guesses.is_empty()) {
         view.mapping = mapping.with_names(&dialect.names).to_string();
@@ -209,17 +250,15 @@ impl InspectionView {
     }
 }
 
-/// Reads the rows of a text by `mapping`; no sample if a column is missing.
+/// Reads the rows of a table by `mapping`; no sample if a column is missing.
 fn read_table(
     view: &mut InspectionView,
-    kind: &TextKind,
-    source: &mut (impl Read + Seek + Send),
+    table: &mut (impl Reopened + ?Sized),
     mapping: &ColumnMapping,
     rate_hz: Option<f64>,
 ) -> Result<Vec<Sample>, SessionFileError> {
-    source.rewind()?;
     let options = TableOptions { columns: mapping.clone(), rate_hz, ..TableOptions::default() };
-    match TextRows::new(kind.clone(), source, &options) {
+    match table.rows(&options) {
         Ok(mut rows) => read(view, &mut rows),
         Err(SessionFileError::Csv(CsvError::MissingColumn { name, .. })) => {
             view.remark(format!("no column is likely to be `{name}`; map one"));
@@ -289,6 +328,9 @@ fn layout(view: &mut InspectionView, table: &OpenedTable<'_>) {
     if dialect.names.is_empty() {
         view.layout.push("the columns have no names".to_owned());
     }
+}
+
+fn columns(view: &mut InspectionView, dialect: &Dialect) {
     view.columns = (0..dialect.n_columns())
         .map(|i| InspectedColumnView {
             number: i + 1,

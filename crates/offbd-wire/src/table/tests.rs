@@ -209,8 +209,14 @@ fn a_file_with_other_names_is_refused_with_a_mapping() {
     let error = recorded(text, "", None).unwrap_err();
     assert_eq!(
         error,
-        "the table lacks the column `t_s`; it has `time`, `x`, `u`. This mapping is likely; check \
-         its units: `t_s=time/s, cmd_qy_rad=u/deg, x_m=x/m`"
+        "the table lacks the column `t_s`; it has `time`, `x`, `u`. This mapping is likely: \
+         `t_s=time/s, cmd_qy_rad=u/UNIT, x_m=x/UNIT`; `offbd inspect` proposes each UNIT by the motion"
+    );
+    let text = "time,x,y,MV_x,MV_y\n0,1,2,3,4\n0.01,1,2,3,4\n";
+    let error = recorded(text, "", None).unwrap_err();
+    assert!(
+        error.ends_with("proposes each UNIT, and which command is which, by the motion"),
+        "{error}"
     );
     let error = recorded("a\nb\n", "", None).unwrap_err();
     assert!(error.contains("no line has two or more columns"), "{error}");
@@ -232,4 +238,11 @@ fn a_header_without_rows_is_not_a_run() {
     let text = format!("{head}{head}0,0,0,0,0\n1,0,0,0,0\n{head}");
     let mut reader = TableReader::recording(text.as_bytes(), &TableOptions::default()).unwrap();
     assert_eq!((reader.by_ref().count(), reader.n_runs()), (2, 1));
+}
+
+#[test]
+fn lines_may_end_with_a_carriage_return_alone() {
+    let text = "t_s,cmd_qy_rad,x_m\r0,0.1,0.2\r0.01,0.1,0.2\r";
+    let rows = TableReader::recording(text.as_bytes(), &TableOptions::default()).unwrap();
+    assert_eq!(rows.map(|row| row.unwrap().t_s).collect::<Vec<_>>(), [0.0, 0.01]);
 }

@@ -177,7 +177,7 @@ const MAX_KEY_BYTES: usize = 64;
 pub(super) struct UnknownKeys(RefCell<Vec<String>>);
 
 impl UnknownKeys {
-    fn note(&self, key: &str) {
+    pub(super) fn note(&self, key: &str) {
         let mut keys = self.0.borrow_mut();
         let end = key.floor_char_boundary(MAX_KEY_BYTES);
         if keys.len() < MAX_UNKNOWN && !keys.iter().any(|known| known == &key[..end]) {

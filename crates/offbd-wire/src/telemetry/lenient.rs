@@ -16,6 +16,15 @@ pub(super) fn is_marker(text: &str) -> bool {
 
 /// Returns the document with such values replaced by the marker, or `None` if it has none.
 pub(super) fn quote_non_finite(document: &[u8]) -> Option<Vec<u8>> {
+    replace_non_finite(document, |_| br#""\u0001not finite""#.to_vec())
+}
+
+/// Returns the document with such values as strings, or `None` if it has none.
+pub(crate) fn with_quotes(document: &[u8]) -> Option<Vec<u8>> {
+    replace_non_finite(document, |token| [b"\"", token, b"\""].concat())
+}
+
+fn replace_non_finite(document: &[u8], replacement: impl Fn(&[u8]) -> Vec<u8>) -> Option<Vec<u8>> {
     let mut quoted = Vec::with_capacity(document.len());
     let mut found = false;
     let mut rest = document;
@@ -28,7 +37,7 @@ pub(super) fn quote_non_finite(document: &[u8]) -> Option<Vec<u8>> {
         let (token, after) = rest.split_at(n);
         if is_non_finite(token) {
             found = true;
-            quoted.extend_from_slice(br#""\u0001not finite""#);
+            quoted.extend(replacement(token));
         } else {
             quoted.extend_from_slice(token);
         }

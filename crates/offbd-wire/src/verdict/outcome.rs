@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
-use crate::words::CodeWord;
+use crate::words::{CodeWord, KindWord};
 use offbd_core::diagnosis::Suspicion;
 use offbd_core::engine::{Misfit, MonitorState, Reach, State};
 use offbd_core::vocabulary::{FaultCode, PerAxis};
@@ -18,21 +18,21 @@ pub enum Outcome {
     /// A fault was confirmed.
     #[serde(rename = "fault")]
     Fault,
-    /// A fault was confirmed, but causes in different parts of the rig would explain it
-    /// equally.
+    /// A fault was confirmed, but causes in different parts of the rig, or a wrong unit of the
+    /// positions, would explain it equally.
     #[serde(rename = "cannot tell")]
     CannotTell,
     /// A test has failed, and nothing was confirmed.
     #[serde(rename = "pending")]
     Pending,
-    /// Judged for long enough to confirm a fault, and there was none; for a session: by every
-    /// monitor.
+    /// No fault was found, although the tests have judged for long enough to confirm one; for a
+    /// session: every monitor has.
     #[serde(rename = "no fault")]
     NoFault,
     /// Only for a session: no fault, but some monitors have not judged.
     #[serde(rename = "partly judged")]
     PartlyJudged,
-    /// No fault, but the rig is not learnt, so that faults of its servos and its ball cannot
+    /// No fault, but the rig is not calibrated, so that faults of its servos and its ball cannot
     /// be confirmed.
     #[serde(rename = "not learnt")]
     NotLearnt,
@@ -53,6 +53,17 @@ impl Outcome {
             Self::PartlyJudged => "partly judged",
             Self::NotLearnt => "not learnt",
             Self::NotJudged => "not judged",
+        }
+    }
+
+    /// Returns the word for people, who know a pending fault as a suspected one, and a rig that is
+    /// learnt as a calibrated one.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Pending => "suspected",
+            Self::NotLearnt => "not calibrated",
+            other => other.as_str(),
         }
     }
 
@@ -83,6 +94,20 @@ pub struct JudgedView {
     /// Causes that would explain the evidence equally, heaviest first; empty if there is only
     /// one.
     pub candidates: Vec<CandidateView>,
+    /// The failure modes of its confirmed fault, each with the time at which it was first named;
+    /// absent if there are none, or if an earlier version stored the summary without them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<NamedKindView>,
+}
+
+/// A failure mode that a confirmed fault was given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct NamedKindView {
+    pub kind: KindWord,
+    /// Time at which it was first named, s on the device's clock.
+    pub t_s: f64,
+    /// Its weight among the candidates at that time, in (0, 1]; null if unknown.
+    pub weight: Option<f64>,
 }
 
 impl Verdict {
@@ -103,7 +128,20 @@ impl Verdict {
             judged_share: monitor.judged_share,
             outcome: self.outcome(code, monitor.reach),
             candidates: candidates.unwrap_or_default(),
+            kinds: self.kinds(code),
         }
+    }
+
+    /// Returns the kinds that a confirmed code was given, in the order of time.
+    fn kinds(&self, code: FaultCode) -> Vec<NamedKindView> {
+        let of_code = self.named.iter().filter(|named| named.code == code);
+        of_code
+            .map(|named| NamedKindView {
+                kind: named.kind.into(),
+                t_s: named.t_s,
+                weight: named.weight,
+            })
+            .collect()
     }
 
     fn outcome(&self, code: FaultCode, reach: Reach) -> Outcome {
@@ -140,13 +178,20 @@ impl SummaryView {
     }
 
     /// Adds the warnings of `misfits`. If one of them prevents judging and nothing was found,
-    /// the result is [`Outcome::NotJudged`].
+    /// the result is [`Outcome::NotJudged`]; if one explains what was found as well as a fault
+    /// of the servos, it is [`Outcome::CannotTell`].
     #[must_use]
     pub fn with_misfits(self, misfits: &[Misfit]) -> Self {
-        let found =
-            matches!(self.outcome, Some(Outcome::Fault | Outcome::CannotTell | Outcome::Pending));
-        let prevented = !found && misfits.iter().any(|m| m.prevents_judging());
-        let outcome = if prevented { Some(Outcome::NotJudged) } else { self.outcome };
+        let any = |of: fn(Misfit) -> bool| misfits.iter().copied().any(of);
+        let servos_only = || self.faults.iter().all(|code| FaultCode::from(*code).axis().is_some());
+        let outcome = match self.outcome {
+            Some(Outcome::Fault) if any(Misfit::excuses_servos) && servos_only() => {
+                Some(Outcome::CannotTell)
+            }
+            found @ Some(Outcome::Fault | Outcome::CannotTell | Outcome::Pending) => found,
+            _ if any(Misfit::prevents_judging) => Some(Outcome::NotJudged),
+            other => other,
+        };
         Self { outcome, warnings: warnings(misfits), ..self }
     }
 }
@@ -183,6 +228,44 @@ mod tests {
         assert_eq!(named, [("stuck_ball", 0.6), ("x_servo", 0.4)]);
         assert_eq!(stuck(vec![ball, ball]).outcome, Outcome::Fault);
         assert_eq!(stuck(Vec::new()).outcome, Outcome::Fault);
+    }
+
+    #[test]
+    fn a_wrong_unit_explains_a_servo_fault_and_no_other() {
+        let scale = |scattered| Misfit::Scale { ratio: 0.1, factor: 10.0, unit_m: 1.0, scattered };
+        let outcome = |code: FaultCode, misfit: Misfit| {
+            let none = Verdict::default().summary("a", 2000, 0, 20.0);
+            let outcome = Some(Outcome::Fault);
+            let found = SummaryView { faults: vec![code.into()], outcome, ..none };
+            found.with_misfits(&[misfit]).outcome
+        };
+        assert_eq!(outcome(FaultCode::XServo, scale(true)), Some(Outcome::CannotTell));
+        assert_eq!(outcome(FaultCode::XServo, scale(false)), Some(Outcome::Fault));
+        assert_eq!(outcome(FaultCode::Sensor, scale(true)), Some(Outcome::Fault));
+    }
+
+    #[test]
+    fn the_kinds_of_a_fault_are_told_with_the_time_at_which_each_was_named() {
+        let (code, mut byte) = (FaultCode::XServo, StatusByte::default());
+        byte.failed();
+        let mut verdict = Verdict::default();
+        let mut take = |t_s: f64, status, kind| {
+            let at = SimTime::new(t_s).unwrap();
+            let candidates = vec![Candidate { code, kind: Some(FaultKind::Dead), weight: 0.5 }];
+            let suspicion = Suspicion { onset: None, kind, candidates };
+            let evidence = Evidence::default();
+            verdict.take(0, &[Transition { at, code, status, byte, suspicion, evidence }]);
+        };
+        let (dead, slow) = (Some(FaultKind::Dead), Some(FaultKind::Slow));
+        take(1.0, FaultStatus::Pending, slow);
+        take(2.0, FaultStatus::Confirmed, None);
+        take(3.0, FaultStatus::Confirmed, dead);
+        take(4.0, FaultStatus::Confirmed, slow);
+        take(5.0, FaultStatus::Confirmed, dead);
+        let monitor = verdict.monitors(&State::default()).swap_remove(code as usize);
+        let told: Vec<_> =
+            monitor.kinds.iter().map(|k| (k.kind.as_str(), k.t_s, k.weight)).collect();
+        assert_eq!(told, [("dead", 3.0, Some(0.5)), ("slow", 4.0, None)]);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
+use super::kind_weight;
+use super::kind_words::{fault_title, is_probable, status_words};
 use super::outcome::is_ambiguous;
 use crate::fault_kind::{Finding, answered_share, kind_text};
 use offbd_core::diagnosis::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
@@ -9,27 +11,34 @@ use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 #[must_use]
 pub fn sentence(transition: &Transition) -> String {
     let Transition { code, status, byte, suspicion, .. } = transition;
-    let name = named(*code, suspicion.kind);
+    let name = fault_title(code, suspicion.kind, weight(suspicion));
     match status {
-        FaultStatus::Cleared => format!("{name} cleared: nothing of it is on record"),
+        FaultStatus::Cleared => format!("{name} cleared"),
         FaultStatus::Healed => format!("{name} healed: enough good sessions followed"),
         status if !byte.test_failed() => {
             let since = transition.at.seconds();
             format!(
-                "{name} passes its test again since {since:.2} s; on record as {status} ({byte})"
+                "{name} passes its test again since {since:.2} s; it was {}",
+                status_words(*status)
             )
         }
         FaultStatus::Pending | FaultStatus::Confirmed => {
             let onset = suspicion.onset.map(|t| format!(" since {:.2} s", t.seconds()));
             let since = onset.unwrap_or_default();
             let (undecided, findings) = (undecided(suspicion), findings(transition));
-            format!("{name} {status}{since}: {undecided}{findings}{}", deciding_motion(transition))
+            format!(
+                "{name} {}{since}: {undecided}{findings}{}",
+                status_words(*status),
+                deciding_motion(transition)
+            )
         }
     }
 }
 
-fn named(code: FaultCode, kind: Option<FaultKind>) -> String {
-    kind.map_or_else(|| code.to_string(), |kind| format!("{code} ({kind})"))
+/// The weight of the kind; 1 if the candidates do not tell.
+fn weight(suspicion: &Suspicion) -> f64 {
+    let candidates = suspicion.candidates.iter().map(|c| (c.kind, c.weight));
+    kind_weight(suspicion.kind, candidates).unwrap_or(1.0)
 }
 
 /// Describes what the evidence does not decide: candidates in different parts of the rig, or
@@ -37,7 +46,7 @@ fn named(code: FaultCode, kind: Option<FaultKind>) -> String {
 fn undecided(suspicion: &Suspicion) -> String {
     let candidates = &suspicion.candidates;
     let weighed = |word: String, c: &Candidate| format!("{word} {:.0} %", 100.0 * c.weight);
-    let causes = || candidates.iter().map(|c| weighed(named(c.code, c.kind), c));
+    let causes = || candidates.iter().map(|c| weighed(fault_title(c.code, c.kind, 1.0), c));
     let kinds = || candidates.iter().filter_map(|c| Some(weighed(c.kind?.to_string(), c)));
     match (is_ambiguous(suspicion), suspicion.kind) {
         (true, _) => format!("cannot tell {}; ", causes().collect::<Vec<_>>().join(" from ")),
@@ -72,9 +81,10 @@ fn deciding_motion(transition: &Transition) -> String {
 }
 
 fn findings(transition: &Transition) -> String {
-    let (evidence, kind) = (&transition.evidence, transition.suspicion.kind);
+    let (evidence, suspicion) = (&transition.evidence, &transition.suspicion);
+    let kind = suspicion.kind;
     match transition.code.axis() {
-        Some(axis) => servo(axis, kind, evidence),
+        Some(axis) => servo(axis, suspicion, evidence),
         None if transition.code == FaultCode::StuckBall => stuck_ball(evidence),
         None => sensor(kind, evidence),
     }
@@ -116,34 +126,36 @@ fn all_readings(evidence: &Evidence) -> String {
     )
 }
 
-fn servo(axis: Axis, kind: Option<FaultKind>, evidence: &Evidence) -> String {
+fn servo(axis: Axis, suspicion: &Suspicion, evidence: &Evidence) -> String {
     let e = &evidence.axes[axis];
-    let answer = e.answer.and_then(|answer| match kind.map(|kind| kind_text(kind).finding) {
+    let finding = suspicion.kind.map(|kind| kind_text(kind).finding);
+    let answer = e.answer.and_then(|answer| match finding {
         Some(Finding::Servo(of)) => of(axis, &answer),
         Some(Finding::Readings(_)) | None => answered_share(axis, &answer),
     });
-    let answer = answer.map(|words| format!("{words}; ")).unwrap_or_default();
-    format!("{answer}{}", accelerated(axis, e))
+    // The cause is as likely as the kind; without a kind the number is what was measured.
+    let probably = if is_probable(weight(suspicion)) { "probably " } else { "" };
+    let along = axis.as_str();
+    let answer = answer.map(|words| format!("the {along} servo {probably}{words}; "));
+    format!("{}{}", answer.unwrap_or_default(), accelerated(axis, e))
 }
 
 fn accelerated(axis: Axis, e: &AxisEvidence) -> String {
     // A residual within its limit is not the cause of the fault.
-    let ground = match (e.violates(), e.path_error_m.zip(e.path_limit_m)) {
+    let ground = match (e.violates(), e.path_nats.zip(e.path_limit_nats)) {
         (true, _) => format!("limit {:.2}", e.limit_m_s2),
-        (false, Some((error, limit))) if e.is_off_path() => format!(
-            "over two seconds its path bends {:.1} mm from the twin's, limit {:.1} mm",
-            error * 1e3,
-            limit * 1e3
-        ),
+        (false, Some((nats, limit))) if e.is_off_path() => {
+            format!("its path is evidence of {nats:.0} nats, limit {limit:.0} nats")
+        }
         (false, _) => format!("evidence {:.0} nats", e.nats),
     };
-    let (along, command) = (axis.as_str(), axis.command());
+    let along = axis.as_str();
     match (e.measured_m_s2, e.twin_m_s2) {
         (Some(measured), Some(twin)) => format!(
-            "the ball accelerates by {measured:.2} m/s² along {along} where {command} asks for \
-             {twin:.2} m/s² ({ground})"
+            "acceleration along {along}: measured {measured:.2} m/s², expected {twin:.2} m/s² \
+             ({ground})"
         ),
-        _ => format!("the ball's acceleration along {along} is not testable now ({ground})"),
+        _ => format!("the acceleration along {along} cannot be tested now ({ground})"),
     }
 }
 

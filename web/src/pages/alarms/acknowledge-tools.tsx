@@ -1,6 +1,8 @@
-import { ActionButton } from "../../parts/action-button";
+import { useDelayed } from "../../hooks/use-delayed";
 import { ActorField, useActor } from "../../parts/actor-field";
-import { ConfirmButton } from "../../parts/confirm-button";
+import { useRefusal } from "../../parts/login/rights";
+import { UndoNote } from "../../parts/undo-note";
+import { plural } from "../../words/numbers";
 
 interface Props {
   /** How many alarms are chosen that nobody has acknowledged yet. */
@@ -8,32 +10,27 @@ interface Props {
   acknowledge: () => Promise<void>;
 }
 
-/** The button that acknowledges the chosen alarms, several of them after a question. */
+/** The button that acknowledges the chosen alarms, which can be taken back for a while. */
 export function AcknowledgeTools({ open, acknowledge }: Props) {
   const actor = useActor();
-  const acknowledgeAsActor = () => {
+  const refused = useRefusal("operator");
+  const delayed = useDelayed(() => {
     actor.remember();
     return acknowledge();
-  };
+  });
   return (
     <>
       <ActorField actor={actor} />
-      {open > 1 ? (
-        <ConfirmButton
-          class="primary"
-          word={`Acknowledge ${open}`}
-          question={`Acknowledge ${open} alarms?`}
-          action={acknowledgeAsActor}
-          needs="operator"
-        >
-          It is recorded that you have seen them, and they are no longer repeated to anybody. This cannot be
-          taken back; a fault that occurs again is unacknowledged.
-        </ConfirmButton>
-      ) : (
-        <ActionButton class="primary" disabled={!open} action={acknowledgeAsActor} needs="operator">
-          Acknowledge {open || ""}
-        </ActionButton>
-      )}
+      <button
+        type="button"
+        class="primary"
+        disabled={!open || delayed.isWaiting || refused !== undefined}
+        title={refused}
+        onClick={delayed.start}
+      >
+        Acknowledge {open || ""}
+      </button>
+      <UndoNote delayed={delayed} text={`Acknowledging ${plural(open, "alarm")}.`} />
     </>
   );
 }

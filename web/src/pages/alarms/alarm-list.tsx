@@ -5,6 +5,7 @@ import { useQuery } from "../../hooks/use-query";
 import { count, plural } from "../../words/numbers";
 import { AlarmTable } from "./alarm-table";
 import { grouped } from "./arranged";
+import { useRigTags } from "./use-rig-tags";
 
 /** Number of alarms that are shown at first, and more each time. */
 const SHOWN = 100;
@@ -22,6 +23,7 @@ export function AlarmList({ alarms, group, chosen, choose }: Props) {
   const advice = useQuery(alarmApi.advice, "advice");
   const now = useNow();
   const [n, setN] = useState(SHOWN);
+  const tags = useRigTags(group === "tag");
   return (
     <>
       <p class="quiet small-text" role="status">
@@ -29,7 +31,7 @@ export function AlarmList({ alarms, group, chosen, choose }: Props) {
       </p>
       <AlarmTable
         alarms={alarms}
-        groups={grouped(alarms.slice(0, n), group)}
+        groups={grouped(alarms.slice(0, n), group, tags)}
         now={now}
         advice={advice.data}
         refetchAdvice={advice.refetch}

@@ -1,4 +1,5 @@
 import type { Advice, Alarm } from "../../api/alarms";
+import { Term } from "../../parts/term";
 import { AlarmRow } from "./alarm-row";
 import type { AlarmGroup } from "./arranged";
 import { alarmKey } from "./use-alarms";
@@ -81,7 +82,9 @@ const Head = ({ areAllChosen, isDisabled, choose }: HeadProps) => (
       </th>
       <th>Rig</th>
       <th>Fault</th>
-      <th>State</th>
+      <th>
+        <Term of="state">State</Term>
+      </th>
       <th>Began</th>
       <th>Acknowledged</th>
     </tr>

@@ -10,8 +10,9 @@ import { FaultChoice } from "./fault-choice";
 import { LastChangeChoice } from "./last-change-choice";
 
 const STATES = [
-  ["active", "Failing or on record"],
+  ["active", "Failing, suspected or on record"],
   ["failing", "Failing"],
+  ["suspected", "Suspected"],
   ["on_record", "Passing again, on record"],
   ["all", "All, including healed"],
 ] as const;

@@ -16,6 +16,7 @@ export const GROUPS = {
   fault: "Fault",
   minute: "Minute of the beginning",
   rig: "Rig",
+  tag: "Tag",
 } as const;
 
 /** Sorts bench-2 before bench-10. */
@@ -30,10 +31,15 @@ const COMPARE: Record<string, (a: Alarm, b: Alarm) => number> = {
   fault: (a, b) => alarmTitle(a).localeCompare(alarmTitle(b)),
 };
 
-const HEADING: Record<string, (alarm: Alarm) => string> = {
-  fault: ({ code }) => alarmCodeTitle(code),
-  minute: ({ since }) => (since ? `Began ${sinceText(since)}` : "Beginning not known"),
-  rig: ({ asset }) => asset,
+/** The tags of each rig that has any. */
+export type RigTags = Map<string, string[]>;
+
+/** The groups to which an alarm belongs: one, except that a rig may have several tags. */
+const HEADINGS: Record<string, (alarm: Alarm, tags: RigTags) => string[]> = {
+  fault: ({ code }) => [alarmCodeTitle(code)],
+  minute: ({ since }) => [since ? `Began ${sinceText(since)}` : "Beginning not known"],
+  rig: ({ asset }) => [asset],
+  tag: ({ asset }, tags) => tags.get(asset) ?? ["Without a tag"],
 };
 
 export interface AlarmGroup {
@@ -51,12 +57,10 @@ export function chosenAlarms(alarms: Alarm[], rig: string, order: string): Alarm
 }
 
 /** Returns the alarms by a grouping of `GROUPS`: the groups in the order of their first alarms. */
-export function grouped(alarms: Alarm[], by: string): AlarmGroup[] {
-  const heading = HEADING[by] ?? (() => "");
+export function grouped(alarms: Alarm[], by: string, tags: RigTags = new Map()): AlarmGroup[] {
+  const headings = HEADINGS[by] ?? (() => [""]);
   const groups = new Map<string, Alarm[]>();
-  for (const alarm of alarms) {
-    const title = heading(alarm);
-    groups.set(title, [...(groups.get(title) ?? []), alarm]);
-  }
+  for (const alarm of alarms)
+    for (const title of headings(alarm, tags)) groups.set(title, [...(groups.get(title) ?? []), alarm]);
   return [...groups].map(([heading, alarms]) => ({ heading, alarms }));
 }

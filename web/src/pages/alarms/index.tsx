@@ -1,5 +1,5 @@
 /** The alarms of the fleet: what fails now, what is on record, and what to do. */
-import { useTitle, withNumber } from "../../hooks/use-title";
+import { useTitle } from "../../hooks/use-title";
 import { EmptyState } from "../../parts/empty-state";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
@@ -18,7 +18,7 @@ export function AlarmsPage() {
   const { filter, word, change } = useAlarmFilter();
   const { alarms: all, error, refetch } = useAlarms(filter);
   const alarms = chosenAlarms(all ?? [], word("rig"), word("sort"));
-  useTitle(withNumber("Alarms", alarms.length));
+  useTitle("Alarms");
   const { chosen, choose, open, refused, acknowledge } = useAcknowledge(alarms, refetch);
   return (
     <main>

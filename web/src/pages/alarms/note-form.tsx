@@ -1,24 +1,26 @@
 import { useState } from "preact/hooks";
-import { alarmApi, type AlarmCode } from "../../api/alarms";
+import { alarmApi, type AlarmCode, type Note } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { ActorField, useActor } from "../../parts/actor-field";
 import { alarmCodeTitle } from "../../words/alarm";
 
 interface Props {
   code: AlarmCode;
-  /** The note before. */
-  text: string;
+  /** The note before, if there is one. */
+  note?: Note;
   refetch: () => Promise<unknown>;
   close: () => void;
 }
 
 /** Edits the owner's note on a fault. */
-export function NoteForm({ code, text, refetch, close }: Props) {
-  const [draft, setDraft] = useState(text);
+export function NoteForm({ code, note, refetch, close }: Props) {
+  const [draft, setDraft] = useState(note?.text ?? "");
+  // What is edited, also if somebody else changes the note meanwhile.
+  const [before] = useState(note);
   const actor = useActor();
   const save = async () => {
     actor.remember();
-    await alarmApi.putNote(code, draft);
+    await alarmApi.putNote(code, draft, before);
     await refetch();
     close();
   };

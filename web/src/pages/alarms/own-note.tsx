@@ -15,7 +15,7 @@ export function OwnNote({ code, advice, refetch }: Props) {
   const refused = useRefusal("operator");
   const note = advice.notes.find((note) => note.code === code);
   if (isEdited) {
-    return <NoteForm code={code} text={note?.text ?? ""} refetch={refetch} close={() => setEdited(false)} />;
+    return <NoteForm code={code} note={note} refetch={refetch} close={() => setEdited(false)} />;
   }
   return (
     <p>

@@ -4,7 +4,7 @@ import { OwnNote } from "./own-note";
 /** A fault, whether it is in the list of alarms or in the memory of its rig. */
 type AdvisedFault = Pick<Alarm, "code" | "kind">;
 
-/** The checks for a kind of fault; those of the code if the kind has none of its own. */
+/** The checks for a kind of fault; those of the code if the kind has no checks itself. */
 function checksFor(advice: Advice, { code, kind }: AdvisedFault): string[] {
   const ofCode = advice.items.filter((item) => item.code === code);
   const own = ofCode.find((item) => item.kind === (kind ?? null));

@@ -3,18 +3,18 @@ import { FaultChip } from "../../parts/fault-chip";
 import { Link } from "../../router/link";
 import { faultPath } from "../../router/paths";
 import { faultMeaning } from "../../words/fault-names";
-import { stateOf } from "../../words/fault-state";
+import { stateOf, type Presence } from "../../words/fault-state";
 import { standing } from "../../words/severity";
 import { ambiguousCauses } from "../../words/verdict";
 
 interface Props {
   asset: string;
   faults: FaultEntry[];
-  hasSession: boolean;
+  presence: Presence;
 }
 
-/** A line for each fault of the rig: what is wrong, whether it fails now, and since when. */
-export function ActiveFaults({ asset, faults, hasSession }: Props) {
+/** A line for each fault of the rig: what is wrong, whether it is known to fail now, and since when. */
+export function ActiveFaults({ asset, faults, presence }: Props) {
   if (!faults.length) return null;
   return (
     <ul class="banner-list" aria-label="Active faults">
@@ -26,7 +26,7 @@ export function ActiveFaults({ asset, faults, hasSession }: Props) {
             <Link to={faultPath(asset, code)} class={`banner banner-${standing(state)}`}>
               <FaultChip
                 fault={{ ...fault, ...state }}
-                hasSession={hasSession}
+                presence={presence}
                 since={last_occurrence?.noted_at}
               />{" "}
               <span>{ambiguousCauses(candidates) || faultMeaning(fault, !state.failing)}</span>{" "}

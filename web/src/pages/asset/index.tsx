@@ -1,6 +1,7 @@
 /** The page of one rig: live view, monitors, charts, drive cycle and trends. */
 import { alarmApi } from "../../api/alarms";
 import { api } from "../../api/client";
+import { isNotFound } from "../../api/request";
 import { useQuery } from "../../hooks/use-query";
 import { useTitle } from "../../hooks/use-title";
 import { UnloadedPage } from "../../parts/unloaded-page";
@@ -17,8 +18,19 @@ export function AssetPage({ name }: { name: string }) {
   const fetchLost = () => alarmApi.alarms({ asset: name, code: "communication_lost", state: "failing" });
   const lost = useQuery(fetchLost, `${name} communication`, FAULTS_MS);
   const refetch = () => Promise.all([faults.refetch(), lost.refetch(), asset.refetch()]);
-  if (!asset.data)
-    return <UnloadedPage title={name} what={name} kind="rig" error={asset.error} retry={asset.refetch} />;
+  // The faults are asked for more often, so they tell of a deletion sooner.
+  const error = isNotFound(faults.error) ? faults.error : asset.error;
+  if (!asset.data || isNotFound(error))
+    return (
+      <UnloadedPage
+        title={name}
+        what={name}
+        kind="rig"
+        wasShown={asset.data !== undefined}
+        error={error}
+        retry={refetch}
+      />
+    );
   return (
     <LiveRig
       key={name}

@@ -2,7 +2,15 @@ import { alarmApi } from "../../api/alarms";
 import { api } from "../../api/client";
 import type { LinkStretch, RigLink } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
-import { clockText, delayText, gapsText, rateText, spacingText, unjudgedText } from "../../words/link";
+import {
+  clockText,
+  delayText,
+  gapsText,
+  rateText,
+  spacingText,
+  unjudgedText,
+  unknownText,
+} from "../../words/link";
 import { count, NONE, seconds } from "../../words/numbers";
 import { dateTime, sinceText, timeOfDay } from "../../words/time";
 import { MuteButton } from "./mute-button";
@@ -81,6 +89,9 @@ export function LinkCard({ asset }: { asset: string }) {
       {link && isCounted && (
         <>
           <LinkTable link={link} />
+          {link.unknown.length > 0 && (
+            <p class="note">Keys of the telemetry that are not understood: {unknownText(link)}.</p>
+          )}
           <p class="quiet small-text">
             Rate and spacing are by the clock of the device, which {clockText(link.clock_offset_s)}. Pauses
             over {seconds(link.gap_s, 1)} are gaps and restart the evaluation. Delay is relative to the

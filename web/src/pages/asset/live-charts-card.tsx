@@ -1,5 +1,6 @@
 import { ALL_CHARTS } from "../../parts/charts/chart-kinds";
 import { RigCharts } from "../../parts/charts/rig-charts";
+import { Term } from "../../parts/term";
 import { seconds } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 import type { LiveCharts } from "./use-live-charts";
@@ -74,7 +75,8 @@ function DrawnCharts({ charts: { group, zoomTo, seek } }: { charts: LiveCharts }
       <RigCharts group={group} kinds={ALL_CHARTS} height={136} onZoom={zoomTo} onSeek={seek} />
       <p class="quiet small-text">
         Time on the device's clock, s. The band around the residual is its limit. The residual is judged only
-        where the background is shaded. Drag over a chart to pause and zoom in, double-click to go on.
+        where the background is <Term of="enabled">shaded</Term>. Drag over a chart to pause and zoom in,
+        double-click to go on.
       </p>
     </>
   );

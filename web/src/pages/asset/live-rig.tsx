@@ -53,10 +53,12 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
   const trends = useTrends(asset.name);
   const active = activeFaults(faults);
   const isLost = connection === "lost";
+  const hasSession = !isLost && state?.session_id != null;
+  const presence = !hasSession ? "ended" : isSilent || lost ? "silent" : "arriving";
   const health = healthOf(active, state, {
     isConnected: connection === "live",
     isLost,
-    isSilent: isSilent || lost !== undefined,
+    isSilent: presence === "silent",
     isLearnt: asset.calibration != null,
   });
   const still = isStill ? { t_s: state?.t_s, at: lost?.since } : undefined;
@@ -65,7 +67,7 @@ export function LiveRig({ asset, faults, lost, refetch }: Props) {
       <AssetHeader name={asset.name} health={health} session={state?.session_id} />
       <Notices isLost={isLost} state={state} />
       {lost && <LostCommunication alarm={lost} refetch={refetch} />}
-      <ActiveFaults asset={asset.name} faults={active} hasSession={!isLost && state?.session_id != null} />
+      <ActiveFaults asset={asset.name} faults={active} presence={presence} />
       <TrendWarnings trends={trends.data} />
       <LearningCard
         name={asset.name}

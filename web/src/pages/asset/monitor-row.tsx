@@ -7,12 +7,13 @@ import { judgedShare } from "../../words/verdict";
 const PASSED = -128;
 const FAILED = 127;
 
-function resultText({ code, counter, enabled, muted }: Monitor): string {
+function resultText({ code, counter, enabled, judged_s, t_s, muted }: Monitor): string {
   if (muted) return `not tested (muted by ${muted.by})`;
   if (counter === FAILED) return "failed";
   if (counter === PASSED) return "passed";
   if (enabled) return "testing";
-  return code === "sensor" ? "waiting" : "waiting for motion";
+  if (code !== "sensor") return "waiting for motion";
+  return t_s != null && judged_s === 0 ? "no positions yet" : "waiting";
 }
 
 function readinessText({ complete_this_cycle, complete_since_clear }: Monitor): string {

@@ -1,4 +1,5 @@
 import type { Monitor } from "../../api/types";
+import { Term } from "../../parts/term";
 import { MonitorRow } from "./monitor-row";
 
 export function Monitors({ asset, monitors }: { asset: string; monitors: Monitor[] }) {
@@ -12,8 +13,8 @@ export function Monitors({ asset, monitors }: { asset: string; monitors: Monitor
         ))}
       </ul>
       <p class="quiet small-text">
-        The bar shows the fault detection counter, from −128 (passed) to 127 (failed). ✓: the test has
-        completed in this session.
+        The bar shows the <Term of="counter">fault detection counter</Term>, from −128 (passed) to 127
+        (failed). ✓: the test has completed in this session.
       </p>
     </section>
   );

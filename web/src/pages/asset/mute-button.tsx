@@ -37,7 +37,7 @@ export function MuteButton({ asset, code, mute, changed }: Props) {
         class="small"
         label={`End the mute of ${alarmCodeTitle(code)}: ${mute.reason}, until ${dateTime(mute.until)}`}
         action={async () => {
-          await alarmApi.unmute(asset, code);
+          await alarmApi.unmute(mute);
           await changed?.();
         }}
         needs="operator"

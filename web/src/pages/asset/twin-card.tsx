@@ -1,5 +1,6 @@
 import type { Asset, AxisCalibration, State } from "../../api/types";
 import { Facts, type Fact } from "../../parts/facts";
+import { Term } from "../../parts/term";
 import { navigate } from "../../router/navigation";
 import { setUpPath } from "../../router/paths";
 import { dimensions, hasDefaultDimensions } from "../../words/dimensions";
@@ -24,7 +25,9 @@ export function TwinCard({ asset, state }: { asset: Asset; state?: State }) {
     calibration && `${dateTime(calibration.made_at)}, from ${count(calibration.samples)} samples`;
   return (
     <section class="card">
-      <h2>The twin</h2>
+      <h2>
+        The <Term of="twin">twin</Term>
+      </h2>
       <Facts
         facts={[
           ["Plant model", state?.fidelity ?? NONE],

@@ -1,6 +1,7 @@
 /** Puts recordings on a common time axis. */
 import type { FaultLine, Trace } from "../../api/types";
 import { faultMark } from "../../parts/charts/fault-marks";
+import type { ChartData } from "../../parts/charts/line-chart";
 import type { Mark } from "../../parts/charts/overlays";
 
 /** Returns the trace with its first moment at `start`, s. */
@@ -17,6 +18,17 @@ export const alignedMarks = (faults: FaultLine[], first: number, start: number):
 export function commonRange(...traces: Trace[]): [number, number] | undefined {
   const ends = traces.flatMap(({ t_s }) => (t_s.length ? [t_s[0]!, t_s[t_s.length - 1]!] : []));
   return ends.length ? [Math.min(...ends), Math.max(...ends)] : undefined;
+}
+
+/** Returns the values of all lines at the time `at`; each line has its own moments in `data`. */
+export function valuesAt([t, ...lines]: ChartData, at: number): (number | null | undefined)[] {
+  let last = t.length - 1;
+  while (last > 0 && t[last]! > at) last--;
+  return lines.map((line) => {
+    let i = last;
+    while (i > 0 && line[i] === undefined) i--;
+    return line[i];
+  });
 }
 
 export interface CompareAddress {

@@ -7,10 +7,16 @@ import { Choice } from "../../parts/choice";
 import { FoundCard } from "../session/found-card";
 import { alignedTrace, commonRange } from "./align";
 import { ComparedCharts } from "./compared-charts";
+import { OverlaidCharts } from "./overlaid-charts";
 import { ShiftField } from "./shift-field";
 import type { Recording } from "./use-recording";
 
 const KINDS = ["residual" as const, "counter" as const, ...SESSION_CHARTS];
+
+const LAYOUTS = [
+  ["beside", "side by side"],
+  ["over", "overlaid"],
+] as const;
 
 const AXIS_OPTIONS = AXES.map((axis) => [axis, axis] as const);
 
@@ -31,6 +37,7 @@ interface Props {
 /** Two recordings on one time axis, and their verdicts. */
 export function Comparison({ a, b, shift, setShift }: Props) {
   const [axis, setAxis] = useState<Axis>("x");
+  const [layout, setLayout] = useState<"beside" | "over">("beside");
   const [groups] = useState(groupsOfOneScale);
   const [zoom, setZoom] = useState<[number, number]>();
   const whole = useMemo<[number, number]>(
@@ -43,13 +50,19 @@ export function Comparison({ a, b, shift, setShift }: Props) {
       <section class="card player">
         <ShiftField shift={shift} set={setShift} />
         <Choice isInline label="Axis" options={AXIS_OPTIONS} value={axis} change={setAxis} />
+        <Choice isInline label="Charts" options={LAYOUTS} value={layout} change={setLayout} />
         <button type="button" disabled={!zoom} onClick={() => setZoom(undefined)}>
           Zoom out
         </button>
       </section>
+      {layout === "over" && <OverlaidCharts a={a} b={b} shift={shift} {...chart} />}
       <div class="compared">
-        <ComparedCharts group={groups[0]} recording={a} start={0} {...chart} />
-        <ComparedCharts group={groups[1]} recording={b} start={shift} {...chart} />
+        {layout === "beside" && (
+          <>
+            <ComparedCharts group={groups[0]} recording={a} start={0} {...chart} />
+            <ComparedCharts group={groups[1]} recording={b} start={shift} {...chart} />
+          </>
+        )}
         {[a, b].map((one) => (
           <FoundCard session={one.session} asset={one.asset} faults={one.faults} />
         ))}

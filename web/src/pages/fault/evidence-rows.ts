@@ -15,7 +15,7 @@ const acceleration = (value?: number | null) => number(value, 3, "m/s²");
 
 const RESIDUAL = "Residual";
 const EVIDENCE = "Weight of evidence for a servo fault";
-const PATH = "Deviation from the twin's path over 2 s, RMS";
+const PATH = "Evidence of the path";
 
 const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Command", (axis) => degrees(axis.command_rad, 2)],
@@ -27,8 +27,8 @@ const ROWS: [name: string, text: (axis: AxisEvidence) => string][] = [
   ["Limit", (axis) => acceleration(axis.limit_m_s2)],
   ["Judged", (axis) => (axis.enabled ? "yes" : "no")],
   [EVIDENCE, (axis) => number(axis.nats, 1, "nats")],
-  [PATH, (axis) => millimetres(axis.path_error_m)],
-  ["Largest deviation of a healthy rig", (axis) => millimetres(axis.path_limit_m)],
+  [PATH, (axis) => number(axis.path_nats, 1, "nats")],
+  ["Limit of that evidence", (axis) => number(axis.path_limit_nats, 1, "nats")],
 ];
 
 /** A value with its standard error. */
@@ -50,7 +50,7 @@ const SPEAKS_FOR_FAULT: Record<string, (axis: AxisEvidence, suspect?: number | n
   [RESIDUAL]: (axis) => axis.enabled && Math.abs(axis.residual_m_s2 ?? 0) >= axis.limit_m_s2,
   [EVIDENCE]: (axis, suspect) => suspect != null && (axis.nats ?? 0) >= suspect,
   [PATH]: (axis) =>
-    axis.path_error_m != null && axis.path_limit_m != null && axis.path_error_m > axis.path_limit_m,
+    axis.path_nats != null && axis.path_limit_nats != null && axis.path_nats >= axis.path_limit_nats,
 };
 
 /** The values at which the monitor of the servo along an axis decided. */

@@ -1,16 +1,19 @@
 /** The record of a fault as names and values. */
 import type { FaultEntry } from "../../api/types";
 import type { Fact } from "../../parts/facts";
+import { Term } from "../../parts/term";
 import { Link } from "../../router/link";
 import { calibrationsPath, sessionPath } from "../../router/paths";
+import { statusWord } from "../../words/fault-state";
 import { NONE, plural, seconds } from "../../words/numbers";
 import { dateTime } from "../../words/time";
 
 export function faultFacts(fault: FaultEntry, isPrinted = false): Fact[] {
-  const { axis, command, occurrences, failed_cycles, acknowledgement } = fault;
+  const { status, axis, command, occurrences, failed_cycles, acknowledgement } = fault;
   const sessions = plural(failed_cycles ?? 0, "session");
   return [
     ...(axis ? [["Axis", `${axis}, moved by ${command}`] satisfies Fact] : []),
+    ["Status", <Term of={status}>{statusWord(status)}</Term>],
     ["Occurrences", `${occurrences} since the last clear, in ${sessions}`],
     ...occurrenceFacts("First", fault.first_occurrence, fault.first_onset_s),
     ...(occurrences > 1 ? occurrenceFacts("Last", fault.last_occurrence, fault.last_onset_s) : []),
@@ -88,7 +91,8 @@ function recoveryFacts(fault: FaultEntry): Fact[] {
   const progress = (required?: number | null, counted?: number | null) =>
     `${plural(required ?? 0, "session")} without the fault; ${counted ?? 0} so far`;
   if (fault.status === "confirmed")
-    return [["Heals after", progress(fault.healing_cycles, fault.healing_counter)]];
-  if (fault.status === "healed") return [["Erased after", progress(fault.aging_cycles, fault.aging_counter)]];
+    return [[<Term of="healing">Heals after</Term>, progress(fault.healing_cycles, fault.healing_counter)]];
+  if (fault.status === "healed")
+    return [[<Term of="aging">Erased after</Term>, progress(fault.aging_cycles, fault.aging_counter)]];
   return [];
 }

@@ -3,7 +3,7 @@ import { StatusChip } from "../../parts/status-chip";
 import { Link } from "../../router/link";
 import { faultReportPath, rigPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
-import { stateOf } from "../../words/fault-state";
+import { presenceOf, stateOf } from "../../words/fault-state";
 import { FaultActions } from "./fault-actions";
 import { isActive } from "./is-active";
 
@@ -16,7 +16,7 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
           <Link to="/">Fleet</Link> / <Link to={rigPath(asset)}>{asset}</Link>
         </p>
         <h1>
-          {faultTitle(fault)} <StatusChip fault={stateOf(fault)} hasSession={fault.session_open === true} />
+          {faultTitle(fault)} <StatusChip fault={stateOf(fault)} presence={presenceOf(fault)} />
         </h1>
         <Link to={faultReportPath(asset, code)}>Report to print</Link>
       </div>

@@ -1,7 +1,7 @@
 import type { FaultEntry, HistoryEntry } from "../../api/types";
 import { EmptyState } from "../../parts/empty-state";
 import { codeMeaning, codeTitle, faultMeaning } from "../../words/fault-names";
-import { isRepair, repairNote } from "../../words/fault-state";
+import { isPresent, isRepair, presenceOf, repairNote } from "../../words/fault-state";
 import { capitalised, sentence } from "../../words/sentence";
 import { isFailing, isTested } from "../../words/status-byte";
 import { sinceText } from "../../words/time";
@@ -11,13 +11,21 @@ import { isActive } from "./is-active";
 const latestFailure = (history: HistoryEntry[]) =>
   history.find(({ by, fault }) => !by && fault && isFailing(fault))?.fault;
 
+/** Why it is not known whether the test of a fault fails now. */
+function doubtText({ session_open, communication_lost_since: lost }: FaultEntry): string {
+  if (!session_open) return "No session is open.";
+  return lost
+    ? `The rig has been silent since ${sinceText(lost)}.`
+    : "It has not been tested in the open session yet.";
+}
+
 /** Since when the test passes again or fails, and whether that is known for now. */
 function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
   const began = fault.last_occurrence && sinceText(fault.last_occurrence.noted_at);
   if (isFailing(fault)) {
-    if (fault.session_open && isTested(fault)) return `Failing${began ? ` since ${began}` : ""}.`;
-    const last = `It failed when it was last tested${began ? `; the failure began at ${began}` : ""}.`;
-    return `${last} ${fault.session_open ? "It has not been tested in the open session yet." : "No session is open."}`;
+    const isNow = isPresent({ tested: isTested(fault) }, presenceOf(fault));
+    if (isNow) return `Failing${began ? ` since ${began}` : ""}.`;
+    return `It failed when it was last tested${began ? `, ${began}` : ""}. ${doubtText(fault)}`;
   }
   const repair = history.find((entry) => entry.fault && isRepair(entry.fault));
   const passes = `Its test passes again${repair ? ` since ${sinceText(repair.at)}` : ""}`;

@@ -1,5 +1,6 @@
 import type { Evidence } from "../../api/types";
 import type { Query } from "../../hooks/use-query";
+import { Term } from "../../parts/term";
 import { EvidenceTable } from "./evidence-table";
 import { decisiveNats } from "./evidence-rows";
 import type { FaultMoment } from "./use-fault-moment";
@@ -15,7 +16,9 @@ export function FreezeFrame({ evidence, moment: { data, error } }: Props) {
   const isLoading = !data && !error;
   return (
     <section class="card">
-      <h2>Freeze frame</h2>
+      <h2>
+        <Term of="freezeFrame">Freeze frame</Term>
+      </h2>
       <p class="quiet small-text">
         The evidence at the first failure of the last occurrence. Values that indicate a fault are red: a
         residual beyond its limit, or a path that deviates more than a healthy one.{" "}

@@ -1,5 +1,6 @@
 import type { FaultEntry } from "../../api/types";
-import { Facts } from "../../parts/facts";
+import { Facts, type Fact } from "../../parts/facts";
+import { Term } from "../../parts/term";
 import { plural } from "../../words/numbers";
 import { judgedShare } from "../../words/verdict";
 
@@ -30,7 +31,7 @@ export function MonitorCard({ fault }: { fault: FaultEntry }) {
       <Facts
         facts={[
           ["In this session", sessionText(fault)],
-          ...(counter ? [["Fault detection counter", counter] satisfies [string, string]] : []),
+          ...(counter ? [[<Term of="counter">Fault detection counter</Term>, counter] satisfies Fact] : []),
           ["Tested", ratioText(in_use)],
         ]}
       />

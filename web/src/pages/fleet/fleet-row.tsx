@@ -32,11 +32,11 @@ const COMMUNICATION = "communication_lost";
 /** The faults, the worst first. What failed when data stopped is not known to fail now. */
 function Faults({ entry }: { entry: Row["entry"] }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
-  const hasSession = entry.session_id != null && !isSilent({ entry });
+  const presence = entry.session_id == null ? "ended" : isSilent({ entry }) ? "silent" : "arriving";
   return (
     <>
       {faults.map((fault) => (
-        <FaultChip fault={fault} hasSession={hasSession} since={fault.failed_at} />
+        <FaultChip fault={fault} presence={presence} since={fault.failed_at} />
       ))}
     </>
   );
@@ -58,7 +58,7 @@ function Findings({ entry }: { entry: Row["entry"] }) {
       )}
       {entry.communication_lost_since && (
         <span
-          class={`chip ${isMuted ? "chip-muted" : "chip-failing"}`}
+          class={`chip chip-lost ${isMuted ? "chip-muted" : "chip-failing"}`}
           title={`Last data: ${dateTime(entry.communication_lost_since)}`}
         >
           <b>No data</b> since {sinceText(entry.communication_lost_since)}

@@ -1,5 +1,5 @@
 /** The page of all rigs: health, faults and lag. */
-import { useTitle, withNumber } from "../../hooks/use-title";
+import { useTitle } from "../../hooks/use-title";
 import { ErrorMessage } from "../../parts/error-message";
 import { SavedViews } from "../../parts/saved-views/saved-views";
 import { UnloadedPage } from "../../parts/unloaded-page";
@@ -7,7 +7,6 @@ import { EmptyFleet } from "./empty-fleet";
 import { EventFeed } from "./event-feed";
 import { FleetList } from "./fleet-list";
 import { FleetTools } from "./fleet-tools";
-import { countRows } from "./rows";
 import { FleetWall } from "./wall";
 import { useFleet } from "./use-fleet";
 import { useFleetView } from "./use-fleet-view";
@@ -15,7 +14,7 @@ import { useFleetView } from "./use-fleet-view";
 export function FleetPage() {
   const { fleet, seenAt, error, refetch, lines } = useFleet();
   const view = useFleetView(fleet);
-  useTitle(withNumber("Fleet", countRows(view.rows, "fault")));
+  useTitle("Fleet");
   if (!fleet) return <UnloadedPage title="Fleet" what="the fleet" error={error} retry={refetch} />;
   if (!fleet.length) return <EmptyFleet error={error} />;
   return (

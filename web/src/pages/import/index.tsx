@@ -4,7 +4,6 @@ import { api } from "../../api/client";
 import type { ImportResult } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
 import { Dialog } from "../../parts/dialog";
-import { count } from "../../words/numbers";
 import { ImportForm } from "./import-form";
 import { ImportOutcome } from "./import-outcome";
 import { useInspection } from "./use-inspection";
@@ -42,7 +41,7 @@ export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
     <Dialog title={`Import ${file.name}`} close={close}>
       {nOthers > 0 && (
         <p class="note" role="status">
-          One file is imported at a time: {file.name} was taken, the {othersText(nOthers)} not.
+          Only {file.name} was taken; import files one by one.
         </p>
       )}
       {problem && !inspection && (
@@ -68,5 +67,3 @@ export function ImportDialog({ file, nOthers, assets, asset, close }: Props) {
     </Dialog>
   );
 }
-
-const othersText = (n: number) => (n === 1 ? "other file was" : `${count(n)} other files were`);

@@ -2,7 +2,7 @@
 import { jobApi } from "../../api/jobs";
 import { useNow } from "../../hooks/use-now";
 import { useQuery } from "../../hooks/use-query";
-import { useTitle, withNumber } from "../../hooks/use-title";
+import { useTitle } from "../../hooks/use-title";
 import { EmptyState } from "../../parts/empty-state";
 import { ErrorMessage } from "../../parts/error-message";
 import { Loading } from "../../parts/loading";
@@ -12,7 +12,7 @@ const INTERVAL_MS = 1000;
 
 export function JobsPage() {
   const { data: jobs, error, refetch } = useQuery(jobApi.jobs, "jobs", INTERVAL_MS);
-  useTitle(withNumber("Jobs", jobs?.length ?? 0));
+  useTitle("Jobs");
   const now = useNow();
   return (
     <main>
@@ -21,7 +21,7 @@ export function JobsPage() {
       </header>
       <p class="quiet">
         Sessions that are judged again, and calibrations. Short jobs come first, and the rigs have equal
-        shares; calibrations that rigs start by themselves have a queue of their own.
+        shares; calibrations that rigs start by themselves have their own queue.
       </p>
       <ErrorMessage error={error} retry={refetch} />
       {!jobs && !error && <Loading what="the jobs" />}

@@ -14,7 +14,7 @@ export function DemoStatus({ demo: { broken, script } }: { demo: Demo }) {
       )}{" "}
       <span class="quiet">
         {script
-          ? "A script injects and repairs faults until you press a button."
+          ? "A script breaks and repairs the rig until you press a button."
           : "The script is paused: you control the faults."}
       </span>
     </p>

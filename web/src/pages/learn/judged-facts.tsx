@@ -30,7 +30,11 @@ export function JudgedFacts({ session, profile, trace }: Props) {
       Run on the whole session
     </ActionButton>
   );
-  const whole = result ? verdict(result.summary, [], profile).text : replay ? "running…" : judgeAll;
+  const whole = result
+    ? verdict(result.summary, result.faults, profile).text
+    : replay
+      ? "running…"
+      : judgeAll;
   return (
     <Facts
       facts={[

@@ -23,7 +23,7 @@ export function Textbook() {
   const { data: all, error } = useQuery(fetchSessions, "sessions", INTERVAL_MS);
   const sessions = all?.filter(isLong);
   const [id, setId] = useState("");
-  /** Sessions without a healthy stretch, which are no examples unless they are chosen. */
+  /** Sessions without a healthy stretch, which are not examples unless they are chosen. */
   const [unfit, setUnfit] = useState<ReadonlySet<string>>(new Set());
   const fit = sessions?.filter((session) => !unfit.has(session.id) || session.id === id);
   const chosen = sessions && (exampleSession(fit ?? [], id) ?? sessions[0]);

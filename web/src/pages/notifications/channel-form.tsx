@@ -3,7 +3,7 @@ import { alarmApi, type Channel } from "../../api/alarms";
 import { ActionButton } from "../../parts/action-button";
 import { Choice } from "../../parts/choice";
 import { useFeature } from "../../parts/service-health";
-import { channelOf, draftOf, EMPTY_DRAFT, isComplete, type ChannelDraft } from "./channel-draft";
+import { channelOf, draftOf, EMPTY_DRAFT, FORMATS, isComplete, type ChannelDraft } from "./channel-draft";
 import { ChannelField } from "./channel-field";
 import { EmailFields } from "./email-fields";
 
@@ -25,7 +25,7 @@ interface Props {
 export function ChannelForm({ channel: before, made }: Props) {
   const [channel] = useState(before);
   const [draft, setDraft] = useState(channel ? draftOf(channel) : EMPTY_DRAFT);
-  const { kind, name, url } = draft;
+  const { kind, name, url, format } = draft;
   const hasEmail = useFeature()("email");
   const isMissing = kind === "email" && !hasEmail;
   const change = (part: Partial<ChannelDraft>) => setDraft((before) => ({ ...before, ...part }));
@@ -42,12 +42,15 @@ export function ChannelForm({ channel: before, made }: Props) {
         )}
         <ChannelField word="Name" value={name} change={(name) => change({ name })} />
         {kind === "webhook" && (
-          <ChannelField word="URL" type="url" value={url} change={(url) => change({ url })} />
+          <>
+            <ChannelField word="URL" type="url" value={url} change={(url) => change({ url })} />
+            <Choice label="Format" value={format} options={FORMATS} change={(format) => change({ format })} />
+          </>
         )}
       </div>
       {kind === "webhook" && (
         <p class="quiet">
-          Each message is posted as a CloudEvent (JSON), signed per Standard Webhooks; the signing key{" "}
+          Each message is signed per Standard Webhooks; the signing key{" "}
           {channel ? "stays as it is." : "is shown once."}
         </p>
       )}

@@ -11,9 +11,20 @@ const REPEATS = [
   [86_400, "Every day"],
 ] as const;
 
-/** The intervals, with that of a rule that was made elsewhere. */
-const repeats = (own: number): (readonly [number, string])[] =>
-  REPEATS.some(([s]) => s === own) ? [...REPEATS] : [...REPEATS, [own, `Every ${duration(own)}`]];
+/** Times for which a fault must fail before the first message is sent, s. */
+const DELAYS = [
+  [0, "At once"],
+  [60, "After 1 minute"],
+  [300, "After 5 minutes"],
+  [900, "After 15 minutes"],
+  [3600, "After 1 hour"],
+] as const;
+
+type Times = readonly (readonly [number, string])[];
+
+/** The times to choose from, with that of a rule that was made elsewhere. */
+const withOwn = (times: Times, own: number, word: string): Times =>
+  times.some(([s]) => s === own) ? times : [...times, [own, `${word} ${duration(own)}`]];
 
 interface Props {
   draft: RuleDraft;
@@ -21,7 +32,7 @@ interface Props {
   change: (part: Partial<RuleDraft>) => void;
 }
 
-/** Name, rigs, tag, channel and reminders of a rule. */
+/** Name, rigs, tag, channel, delay and reminders of a rule. */
 export function RuleFields({ draft, channels, change }: Props) {
   return (
     <div class="form-row">
@@ -53,9 +64,15 @@ export function RuleFields({ draft, channels, change }: Props) {
         change={(channel) => change({ channel })}
       />
       <Choice
+        label="Sent if it still fails"
+        value={draft.delay}
+        options={withOwn(DELAYS, draft.delay, "After")}
+        change={(delay) => change({ delay })}
+      />
+      <Choice
         label="Repeated while it fails"
         value={draft.repeat}
-        options={repeats(draft.repeat)}
+        options={withOwn(REPEATS, draft.repeat, "Every")}
         change={(repeat) => change({ repeat })}
       />
     </div>

@@ -10,8 +10,8 @@ const MUTE_H = 8;
 
 /** The settings of a rule: every one, so that a change of one keeps the others. */
 function settingsOf(rule: Rule): { [Key in keyof Required<NewRule>]: NewRule[Key] } {
-  const { name, asset, tag, channel, codes, changes, enabled, repeat_s, silent_until } = rule;
-  return { name, asset, tag, channel, codes, changes, enabled, repeat_s, silent_until };
+  const { name, asset, tag, channel, codes, changes, enabled, delay_s, repeat_s, silent_until } = rule;
+  return { name, asset, tag, channel, codes, changes, enabled, delay_s, repeat_s, silent_until };
 }
 
 const isSilent = ({ silent_until }: Rule) => !!silent_until && Date.parse(silent_until) > Date.now();
@@ -38,6 +38,7 @@ export function RuleRow({ rule, channels, refetch }: Props) {
       </td>
       <td>
         {codes}: {(rule.changes ?? []).map((word) => CHANGES[word]).join("; ")}
+        {!!rule.delay_s && <span class="quiet"> if it still fails after {duration(rule.delay_s)}</span>}
       </td>
       <td data-word="by">{rule.channel_name}</td>
       <td data-word="repeated">{rule.repeat_s ? `every ${duration(rule.repeat_s)}` : "–"}</td>

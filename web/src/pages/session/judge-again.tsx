@@ -1,5 +1,5 @@
 import { isFinished } from "../../api/poll";
-import type { Session } from "../../api/types";
+import type { Asset, FaultLine, Session } from "../../api/types";
 import { useReplay } from "../../hooks/use-replay";
 import { Link } from "../../router/link";
 import { jobsPath } from "../../router/paths";
@@ -8,13 +8,24 @@ import { ReplayFields } from "./replay-fields";
 import { replaySettings } from "./replay-settings";
 import { ReplayVerdict } from "./replay-verdict";
 
-export function JudgeAgain({ session }: { session: Session }) {
+interface Props {
+  session: Session;
+  /** Its rig, as it is described now. */
+  asset: Asset;
+  /** Its fault lines. */
+  faults: FaultLine[];
+}
+
+export function JudgeAgain({ session, asset, faults }: Props) {
   const { replay, judge } = useReplay(session.id);
   return (
     <section class="card">
       <h2>Judge again</h2>
-      <p class="quiet">Judges the same samples with other settings. The session itself is not changed.</p>
-      <ReplayFields judge={(form) => judge(replaySettings(form))} />
+      <p class="quiet">
+        Judges the same samples with other settings, or with a description of the rig that was corrected
+        since. The session itself is not changed.
+      </p>
+      <ReplayFields judge={(form) => judge(replaySettings(form, asset))} />
       {replay && !isFinished(replay) && (
         <p role="status">
           {replay.waits ? (
@@ -31,7 +42,12 @@ export function JudgeAgain({ session }: { session: Session }) {
         </p>
       )}
       {replay?.result && (
-        <ReplayVerdict session={session} result={replay.result} profile={replay.settings.profile} />
+        <ReplayVerdict
+          session={session}
+          faults={faults}
+          result={replay.result}
+          profile={replay.settings.profile}
+        />
       )}
     </section>
   );

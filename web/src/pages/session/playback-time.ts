@@ -2,7 +2,7 @@
 import type { TraceBuffer } from "../../live/buffer";
 import { ballAt } from "../../live/pose";
 
-/** Longest step of one frame, s: slower frames than that are no playback, and a hidden tab has none. */
+/** Longest step of one frame, s: slower frames than that are not playback, and a hidden tab has none. */
 const LONGEST_STEP_S = 1;
 
 /** Longest search for the first position of the ball, s. */

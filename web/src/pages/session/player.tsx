@@ -2,14 +2,15 @@ import { useMemo, useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Asset, Axis, FaultLine, Session, Thresholds } from "../../api/types";
 import { useQuery } from "../../hooks/use-query";
+import { useSeen } from "../../hooks/use-seen";
 import { AXES, type TraceBuffer } from "../../live/buffer";
-import { faultMark } from "../../parts/charts/fault-marks";
+import { judgedMarks } from "./judged-marks";
 import { PlaybackTop } from "./playback-top";
 import { PlayerCard } from "./player-card";
 import type { ProfileOrRecorded } from "./profile-choice";
 import { remarkMarks } from "./remarks";
 import { RemarksCard } from "./remarks-card";
-import { alarmMarks, type TriedSettings } from "./trial";
+import type { TriedSettings } from "./trial";
 import { TrialCard } from "./trial-card";
 import { useDetail } from "./use-detail";
 import { useHotkeys } from "./use-hotkeys";
@@ -53,12 +54,14 @@ export function Player(props: Props) {
   const playback = usePlayback(buffer);
   const detail = useDetail(session, profile, buffer, stride, points);
   const [tried, setTried] = useState<TriedSettings>({});
-  const trial = useTrial(session.id, profile, tried);
+  const { ref: trialCard, isSeen } = useSeen<HTMLElement>();
+  const isWanted = isSeen || profile !== "";
+  const trial = useTrial({ session: session.id, profile, settings: tried, isWanted });
   const remarks = useQuery(() => api.remarks(session.id), `${session.id} remarks`);
   const marks = useMemo(() => {
-    const tried = alarmMarks(trial.trial?.monitors ?? []);
-    return [...faults.map(faultMark), ...tried, ...remarkMarks(remarks.data ?? [])];
-  }, [faults, trial, remarks.data]);
+    const judged = judgedMarks({ faults, profile, tried, trial: trial.trial });
+    return [...judged, ...remarkMarks(remarks.data ?? [])];
+  }, [faults, profile, tried, trial.trial, remarks.data]);
   const charts = usePlaybackCharts({ buffer, stride, detail, marks, playback });
   useHotkeys(playback);
   if (!buffer?.t.length) return null;
@@ -83,7 +86,7 @@ export function Player(props: Props) {
         setProfile={setProfile}
       />
       <RemarksCard session={session.id} remarks={remarks} playback={playback} zoom={charts.zoom} />
-      <TrialCard thresholds={thresholds} settings={tried} choose={setTried} state={trial} />
+      <TrialCard thresholds={thresholds} settings={tried} choose={setTried} state={trial} card={trialCard} />
     </>
   );
 }

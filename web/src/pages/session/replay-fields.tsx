@@ -5,7 +5,12 @@ import type { ReplayForm } from "./replay-settings";
 
 /** The form for the settings with which a session is judged again. */
 export function ReplayFields({ judge }: { judge: (form: ReplayForm) => Promise<void> }) {
-  const [form, setForm] = useState<ReplayForm>({ profile: "textbook", debounce: "", isUnlearnt: false });
+  const [form, setForm] = useState<ReplayForm>({
+    profile: "textbook",
+    debounce: "",
+    isUnlearnt: false,
+    isPresent: false,
+  });
   const set = (part: Partial<ReplayForm>) => setForm((before) => ({ ...before, ...part }));
   return (
     <div class="form-row">
@@ -29,6 +34,14 @@ export function ReplayFields({ judge }: { judge: (form: ReplayForm) => Promise<v
           onChange={(e) => set({ isUnlearnt: e.currentTarget.checked })}
         />{" "}
         without the calibration
+      </label>
+      <label class="check">
+        <input
+          type="checkbox"
+          checked={form.isPresent}
+          onChange={(e) => set({ isPresent: e.currentTarget.checked })}
+        />{" "}
+        with the rig as described now
       </label>
       <ActionButton class="primary" action={() => judge(form)} needs="operator">
         Judge again

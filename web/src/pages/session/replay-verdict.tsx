@@ -1,4 +1,4 @@
-import type { Replay, Session } from "../../api/types";
+import type { FaultLine, Replay, Session } from "../../api/types";
 import { Facts } from "../../parts/facts";
 import { plural } from "../../words/numbers";
 import { verdict } from "../../words/verdict";
@@ -7,15 +7,17 @@ import { Hash } from "./hash";
 
 interface Props {
   session: Session;
+  /** The fault lines of the record. */
+  faults: FaultLine[];
   result: NonNullable<Replay["result"]>;
   /** The profile that was asked for, if not that of the session. */
   profile?: string | null;
 }
 
 /** The recorded verdict and that of the replay. */
-export function ReplayVerdict({ session, result, profile }: Props) {
+export function ReplayVerdict({ session, faults, result, profile }: Props) {
   const { same, differences, recorded_hash, summary } = result;
-  const recorded = session.verdict ? verdict(session.verdict).text : "when the session has ended";
+  const recorded = session.verdict ? verdict(session.verdict, faults).text : "when the session has ended";
   return (
     <div class="verdicts">
       <p role="status" class={same ? "status-ok" : "status-pending"}>
@@ -30,7 +32,7 @@ export function ReplayVerdict({ session, result, profile }: Props) {
         />
         <Facts
           facts={[
-            ["Judged again", verdict(summary, [], profile).text],
+            ["Judged again", verdict(summary, result.faults, profile).text],
             ["Verdict hash", <Hash hash={summary.verdict_hash} />],
           ]}
         />

@@ -68,7 +68,7 @@ export function SessionDetails({ session, asset, faults, refetch }: Props) {
         points={POINTS}
         setProfile={chooseProfile}
       />
-      <JudgeAgain session={session} />
+      <JudgeAgain session={session} asset={asset} faults={faults} />
     </main>
   );
 }

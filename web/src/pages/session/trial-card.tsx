@@ -1,5 +1,6 @@
-import type { FaultCode, Thresholds } from "../../api/types";
+import type { FaultCode, Thresholds, Trial } from "../../api/types";
 import { ErrorMessage } from "../../parts/error-message";
+import { Term } from "../../parts/term";
 import { isTried, type TriedSettings, type TriedValues } from "./trial";
 import { TrialRow } from "./trial-row";
 import type { TrialState } from "./use-trial";
@@ -9,14 +10,17 @@ interface Props {
   settings: TriedSettings;
   choose: (settings: TriedSettings) => void;
   state: TrialState;
+  /** The card, whose reader wants to know what is found. */
+  card: (card: HTMLElement | null) => void;
 }
 
 /** Sliders for limits and debounce times, with the alarms that they would raise on this session. */
-export function TrialCard({ thresholds, settings, choose, state: { trial, error } }: Props) {
+export function TrialCard({ thresholds, settings, choose, state: { trial, baseline, error }, card }: Props) {
   const set = (code: FaultCode, values: TriedValues) => choose({ ...settings, [code]: values });
-  const found = (code: FaultCode) => trial?.monitors.find((monitor) => monitor.thresholds.code === code);
+  const of = (code: FaultCode, from?: Trial) =>
+    from?.monitors.find((monitor) => monitor.thresholds.code === code);
   return (
-    <section class="card">
+    <section class="card" ref={card}>
       <h2>Try other limits</h2>
       <p class="quiet">
         Counts the alarms that other limits and debounce times would raise on this session on its own,
@@ -28,9 +32,11 @@ export function TrialCard({ thresholds, settings, choose, state: { trial, error 
             <tr>
               <th scope="col">Monitor</th>
               <th scope="col">Limits</th>
-              <th scope="col">Debounce</th>
+              <th scope="col">
+                <Term of="debounce">Debounce</Term>
+              </th>
               <th scope="col" class="n">
-                Confirmed
+                <Term of="confirmed">Confirmed</Term>
               </th>
               <th scope="col" class="n">
                 Test failed
@@ -44,7 +50,8 @@ export function TrialCard({ thresholds, settings, choose, state: { trial, error 
                 thresholds={one}
                 values={settings[one.code] ?? {}}
                 set={(values) => set(one.code, values)}
-                found={found(one.code)}
+                found={of(one.code, trial)}
+                baseline={isTried(settings) ? of(one.code, baseline) : undefined}
               />
             ))}
           </tbody>

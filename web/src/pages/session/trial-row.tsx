@@ -1,6 +1,6 @@
 import type { Thresholds, TriedMonitor } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
-import { number, plural, seconds } from "../../words/numbers";
+import { NONE, number, plural, seconds } from "../../words/numbers";
 import { factorAt, hasLimit, positionOf, type TriedValues } from "./trial";
 
 /** Longest debounce of the slider, s. */
@@ -12,10 +12,26 @@ interface Props {
   set: (values: TriedValues) => void;
   /** What was found with the tried settings. */
   found?: TriedMonitor;
+  /** What is found as set, while something is tried. */
+  baseline?: TriedMonitor;
 }
 
+interface NumberProps {
+  n?: number;
+  noun: string;
+  /** The number as set, to compare with. */
+  asSet?: number;
+}
+
+const Found = ({ n, noun, asSet }: NumberProps) => (
+  <td class="n">
+    {n === undefined ? NONE : plural(n, noun)}
+    {asSet !== undefined && <span class="quiet"> (as set: {asSet})</span>}
+  </td>
+);
+
 /** The sliders of one monitor, and what it would find. */
-export function TrialRow({ thresholds: { code, fail_s }, values, set, found }: Props) {
+export function TrialRow({ thresholds: { code, fail_s }, values, set, found, baseline }: Props) {
   const { limit, debounce_s } = values;
   const title = codeTitle(code);
   return (
@@ -53,8 +69,8 @@ export function TrialRow({ thresholds: { code, fail_s }, values, set, found }: P
         />{" "}
         <span class="n">{debounce_s === undefined ? "as set" : number(debounce_s, 2, "s")}</span>
       </td>
-      <td class="n">{found ? plural(found.alarms, "alarm") : "–"}</td>
-      <td class="n">{found ? plural(found.failures, "failure") : "–"}</td>
+      <Found n={found?.alarms} noun="alarm" asSet={baseline?.alarms} />
+      <Found n={found?.failures} noun="failure" asSet={baseline?.failures} />
     </tr>
   );
 }

@@ -32,12 +32,12 @@ export const isTried = (settings: TriedSettings) =>
 export const factorAt = (position: number) => Number((10 ** position).toPrecision(3));
 export const positionOf = (factor: number) => Math.log10(factor);
 
-/** The marks of the alarms that the tried settings raise. */
-export const alarmMarks = (monitors: TriedMonitor[]): Mark[] =>
+/** The marks of the alarms that other settings raise, which `word` names. */
+export const alarmMarks = (monitors: TriedMonitor[], word: string): Mark[] =>
   monitors.flatMap(({ thresholds: { code }, alarms_t_s }) =>
     alarms_t_s.map((t) => ({
       t,
-      label: `${codeTitle(code)}, tried`,
+      label: `${codeTitle(code)}, ${word}`,
       colour: "warn",
       axis: code === "x_servo" ? "x" : code === "y_servo" ? "y" : null,
     })),

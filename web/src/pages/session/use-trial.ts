@@ -8,28 +8,41 @@ import { isTried, trialQuery, type TriedSettings } from "./trial";
 const DELAY_MS = 200;
 
 export interface TrialState {
-  /** What was found with the settings of the last answer; undefined while nothing is tried. */
+  /** What was found with the settings of the last answer. */
   trial?: Trial;
+  /** What is found while nothing is tried, to compare with. */
+  baseline?: Trial;
   error?: unknown;
 }
 
+interface Options {
+  session: string;
+  profile: ProfileOrRecorded;
+  settings: TriedSettings;
+  /** Whether anybody looks at the result: a trial judges the whole session. */
+  isWanted: boolean;
+}
+
 /** Asks what other settings would find, one request after the other; only the latest settings count. */
-export function useTrial(session: string, profile: ProfileOrRecorded, settings: TriedSettings): TrialState {
-  const [state, setState] = useState<TrialState>({});
+export function useTrial({ session, profile, settings, isWanted }: Options): TrialState {
+  /** The last answers, and the profile that they are of. */
+  const [state, setState] = useState<TrialState & { of: ProfileOrRecorded }>({ of: profile });
   const inFlight = useRef<Promise<void>>(Promise.resolve());
   useEffect(() => {
+    if (!isWanted) return;
     let isStale = false;
-    if (!isTried(settings)) {
-      setState({});
-      return;
-    }
+    const found = (trial: Trial) =>
+      setState((before) => {
+        const known = before.of === profile ? before.baseline : undefined;
+        return { of: profile, trial, baseline: isTried(settings) ? known : trial };
+      });
     const ask = async () => {
       await inFlight.current;
       if (isStale) return;
       const query = { ...trialQuery(settings), profile: profile || undefined };
       inFlight.current = api.trial(session, query).then(
-        (trial) => void (isStale || setState({ trial })),
-        (error: unknown) => void (isStale || setState({ error })),
+        (trial) => void (isStale || found(trial)),
+        (error: unknown) => void (isStale || setState({ of: profile, error })),
       );
     };
     const timer = setTimeout(() => void ask(), DELAY_MS);
@@ -37,6 +50,6 @@ export function useTrial(session: string, profile: ProfileOrRecorded, settings: 
       isStale = true;
       clearTimeout(timer);
     };
-  }, [session, profile, settings]);
-  return state;
+  }, [session, profile, settings, isWanted]);
+  return state.of === profile ? state : {};
 }

@@ -7,7 +7,7 @@ export type SessionKey = "asset" | "tag" | "name" | "verdict" | "from" | "to" | 
 /** A day as the field of a date gives it, such as 2026-03-01. */
 const DAY = /^(\d{4})-(\d\d)-(\d\d)$/;
 
-/** Returns the moment at which the local day begins, or `days` later; undefined if it is no day. */
+/** Returns the moment at which the local day begins, or `days` later; undefined if it is not a day. */
 function startOf(day: string, days = 0): string | undefined {
   const [, year, month, date] = DAY.exec(day) ?? [];
   const start = new Date(Number(year), Number(month) - 1, Number(date) + days);

@@ -49,6 +49,8 @@ const DEFAULT = {
   angle_limit_rad: 0.2,
 };
 
+const limitOfAsset = (asset?: Asset) => asset?.servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad;
+
 export function describeAsset(asset?: Asset): Description {
   const { plate, ball, axes, diagnostics } = asset ?? {};
   const millimetres = (m: number | null | undefined, fallback: number) => rounded((m ?? fallback) * 1e3);
@@ -71,14 +73,18 @@ export function describeAsset(asset?: Asset): Description {
   };
 }
 
+const DEFAULTS = describeAsset();
+
+/** Whether a field has the default of the service, which nobody may have measured. */
+export const isDefault = (description: Description, field: NumberField) =>
+  description[field] === DEFAULTS[field];
+
 /** Returns the settings of the diagnosis; undefined if all are those of the service. */
 function diagnosticsOf({ debounce, falseAlarms }: Description, before?: Asset): Asset["diagnostics"] {
   const settings = { ...before?.diagnostics, debounce_s: debounce, false_alarms_per_rig_year: falseAlarms };
   const given = Object.entries(settings).filter(([, value]) => value != null && !Number.isNaN(value));
   return given.length ? Object.fromEntries(given) : undefined;
 }
-
-const limitOfAsset = (asset?: Asset) => asset?.servo?.angle_limit_rad ?? DEFAULT.angle_limit_rad;
 
 /** Returns the largest plate angle, rad: exactly that of before if the form shows its degrees, which are rounded. */
 function limitOf(degrees: number, before?: Asset): number {

@@ -1,4 +1,4 @@
-import type { Description, NumberField } from "./description";
+import { isDefault, type Description, type NumberField } from "./description";
 
 export interface FieldsProps {
   description: Description;
@@ -18,7 +18,9 @@ interface Props extends FieldsProps {
 export function NumberInput({ description, set, field, label, unit }: Props) {
   return (
     <label>
-      {label}, {unit}{" "}
+      <span>
+        {label}, {unit} {isDefault(description, field) && <span class="quiet small-text">default</span>}
+      </span>{" "}
       <input
         type="number"
         step="any"

@@ -1,11 +1,14 @@
 /** The kinds of charts of a rig, for each axis. */
 import type { Axis, PlateAngle } from "../../api/types";
 import type { NumberColumn, SharedColumn } from "../../live/axis-columns";
+import type { GlossaryTerm } from "../../words/glossary";
 import type { Line, Threshold } from "./chart-options";
 import { MONITOR_KINDS } from "./monitor-kinds";
 
 export interface ChartKind {
   title: (axis: Axis) => string;
+  /** The term of the glossary that explains the title. */
+  term?: GlossaryTerm;
   unit: string;
   digits: number;
   /** Smallest extent of the scale on either side of zero. */
@@ -47,6 +50,7 @@ const acceleration: ChartKind = {
 
 const residual: ChartKind = {
   title: (axis) => `Residual along ${axis}`,
+  term: "residual",
   unit: "m/s²",
   digits: 1,
   minExtent: 0.3,

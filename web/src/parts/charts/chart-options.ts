@@ -1,7 +1,7 @@
 /** The uPlot options of a chart over time. */
 import type uPlot from "uplot";
 import { colour } from "../../theme";
-import { valueLabels, valueRange } from "./axis-labels";
+import { valueLabels, valueRange, valueStep } from "./axis-labels";
 
 export interface Line {
   label: string;
@@ -72,7 +72,8 @@ function axes(digits: number): uPlot.Axis[] {
     {
       ...common,
       size: 46 * scale,
-      space: 17 * scale,
+      space: 1,
+      incrs: (_, _axis, low, high, px) => [valueStep(low, high, px / scale)],
       values: (_, ticks, _axis, _space, step) => value(ticks, step),
     },
   ];

@@ -4,6 +4,7 @@ import type { ChartKind } from "./chart-kinds";
 
 const evidence: ChartKind = {
   title: (axis) => `Evidence against the ${axis} servo`,
+  term: "evidence",
   unit: "nats",
   digits: 0,
   minExtent: 1,
@@ -16,6 +17,7 @@ const evidence: ChartKind = {
 
 const counter: ChartKind = {
   title: (axis) => `Fault detection counter, ${axis} servo`,
+  term: "counter",
   unit: "",
   digits: 0,
   minExtent: 127,

@@ -127,7 +127,7 @@ interface PlacedText {
   height: number;
 }
 
-/** Draws a text on a ground of its own, so that it can be read above the curves. */
+/** Draws a text on its own ground, so that it can be read above the curves. */
 function drawText(ctx: CanvasRenderingContext2D, placed: PlacedText): void {
   const { text, left, top, width, height } = placed;
   ctx.globalAlpha = 0.9;

@@ -1,6 +1,7 @@
 import { useEffect, useMemo, useRef } from "preact/hooks";
 import type { Axis } from "../../api/types";
 import { useLatest } from "../../hooks/use-latest";
+import { Term } from "../term";
 import type { ChartGroup } from "./chart-group";
 import { CHART_KINDS, withoutTwinPositions, type ChartKind, type ChartKindName } from "./chart-kinds";
 import type { Threshold } from "./chart-options";
@@ -55,7 +56,8 @@ export function RigChart(props: Props) {
   return (
     <figure class="chart">
       <figcaption>
-        <b>{kind.title(axis)}</b> <span class="quiet">{kind.unit}</span>
+        <b>{kind.term ? <Term of={kind.term}>{kind.title(axis)}</Term> : kind.title(axis)}</b>{" "}
+        <span class="quiet">{kind.unit}</span>
         <ChartKey kind={kind} element={key} />
       </figcaption>
       <div

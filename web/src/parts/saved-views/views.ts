@@ -14,7 +14,7 @@ export const MAX_VIEW_NAME = 60;
 const isView = (value: unknown): value is SavedView =>
   typeof (value as SavedView | null)?.name === "string" && typeof (value as SavedView).query === "string";
 
-/** Reads what the browser has kept; what is no view is left out. */
+/** Reads what the browser has kept; what is not a view is left out. */
 export function parseViews(text: string | null): SavedView[] {
   try {
     const kept: unknown = JSON.parse(text ?? "[]");

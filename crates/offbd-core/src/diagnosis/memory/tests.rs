@@ -215,7 +215,7 @@ fn a_kind_is_not_told_after_the_failure_has_passed() {
 }
 
 #[test]
-fn a_failure_after_healing_begins_anew_and_aging_erases_all() {
+fn a_failure_after_healing_begins_again_and_aging_erases_all() {
     let mut bench = Bench::new(1, true);
     bench.rules.aging_cycles = 2;
     let good_cycle = |bench: &mut Bench| {

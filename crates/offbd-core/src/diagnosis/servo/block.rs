@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Length of a block, s: a tenth of the time in which the plainest fault shows. Slower
 /// readings make one block each.
 pub(in crate::diagnosis) const BLOCK_S: f64 = 0.05;
+/// Time without a block after which a window starts again, s: three readings of a slow
+/// sensor.
+pub(super) const BREAK_S: f64 = 0.6;
 
 /// The twin's free path along one axis: position (m), velocity (m/s), acceleration
 /// (m/s²).

@@ -46,7 +46,7 @@ pub(super) struct FilterStep {
 }
 
 /// Velocity given by a push by hand, m/s: one standard deviation. Chosen.
-const PUSH_DEVIATION_M_S: f64 = 0.15;
+pub(super) const PUSH_DEVIATION_M_S: f64 = 0.15;
 /// Cost of the explanation that the ball was pushed, nats. The prior odds of a push
 /// within a twentieth of a second would be five or more. A lower cost makes the judgement
 /// later and more certain, above all if one push follows another; at equally few false
@@ -91,6 +91,11 @@ impl ServoFilter {
     pub(super) fn shift(&mut self, position: f64, velocity: f64) {
         self.state[0] += position;
         self.state[1] += velocity;
+    }
+
+    /// The prior of the parameters.
+    pub(super) const fn prior(&self) -> &ParameterPrior {
+        &self.prior
     }
 
     /// Estimate and variance of parameter `k`.
@@ -231,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn a_push_is_no_parameter() {
+    fn a_push_is_not_a_parameter() {
         let filter = follow(STEADY_FAULTY, |t| 0.25 * (t - 4.01).max(0.0));
         for k in 0..PARAMETERS {
             assert!(filter.parameter(k).0.abs() < 0.03, "{k}: {:?}", filter.parameter(k));

@@ -12,7 +12,7 @@
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::block::ReadingBlock;
+use super::block::{BREAK_S, ReadingBlock};
 use super::estimate::ServoEstimate;
 use super::filter::PARAMETERS;
 use crate::maths::median;
@@ -31,9 +31,6 @@ const LEAST_BLOCKS: u32 = 10;
 const PARTS: usize = 3;
 /// Span of the blocks in each part that counts as motion, m: that of a calibration.
 const MOVING_M: f64 = 0.002;
-/// Time without a block after which a window starts again, s: three readings of a slow
-/// sensor.
-const BREAK_S: f64 = 0.6;
 /// Number of recent windows, in 0.4 kB. Chosen: an engine has a few hundred bytes for each
 /// axis.
 const MAX_RECENT: usize = 8;
@@ -350,9 +347,9 @@ mod tests {
         1e-4 * (37.0 * t).sin()
     }
 
-    /// A servo with another offset, gain or delay: the deviation is b t²/2, m times the
-    /// twin's path, and the path at t − d less the path at t. The delay is exact in the
-    /// first order: 10 ms of sin(2 t) leave (2 · 0.01)²/2 of the path.
+    /// The deviation of a servo with the wrong offset b is b t²/2; with the wrong gain m, m times
+    /// the twin's path; with the delay d, the path at t − d minus the path at t. The estimate of a
+    /// delay is exact to first order: for sin(2 t), 10 ms leave (2 · 0.01)²/2 of the path.
     #[test]
     fn validate_parameters_against_closed_forms() {
         let late = |t: f64| ((2.0 * t).sin() - (2.0 * (t - 0.01)).sin()) / 4.0;

@@ -10,16 +10,17 @@
 //! pushes as a rival explanation: Willsky & Jones 1976.
 //!
 //! The parameters of the second filter are the servo's effective offset, gain and delay,
-//! which tell the kind of fault. In addition, [`path_error`] compares the path itself
-//! with the twin's. While the ball cannot respond (at rest within its breakaway angle, at
-//! the edge, unseen) nothing is compared.
+//! which tell the kind of fault. Both filters take the size of the noise as learnt; the
+//! evidence of the [`path`] of the last two seconds does not depend on it. While the ball
+//! cannot respond (at rest within its breakaway angle, at the edge, unseen) nothing is
+//! compared.
 
 mod answer;
 mod block;
 mod estimate;
 mod filter;
 mod least_squares;
-mod path_error;
+mod path;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -32,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use block::{BlockBuilder, ReadingBlock};
 use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
 use least_squares::LeastSquares;
-use path_error::PathError;
+use path::PathEvidence;
 
 use super::calibration::MOST_MODEL_ERROR_M_S2;
 use crate::vocabulary::SimTime;
@@ -182,7 +183,7 @@ pub struct ServoFilterBank {
     followed_s: f64,
     steady_m_s2: f64,
     least_squares: LeastSquares,
-    path: PathError,
+    path: PathEvidence,
 }
 
 impl ServoFilterBank {
@@ -200,7 +201,7 @@ impl ServoFilterBank {
             followed_s: 0.0,
             steady_m_s2: 0.0,
             least_squares: LeastSquares::default(),
-            path: PathError::default(),
+            path: PathEvidence::default(),
         }
     }
 
@@ -208,7 +209,6 @@ impl ServoFilterBank {
     /// completed a block that could be evaluated.
     pub fn take(&mut self, t: f64, measured_m: f64, path: &TwinPath) -> bool {
         let Some(block) = self.builder.take(t, measured_m, path) else { return false };
-        self.path.take(block.t, block.deviation_m());
         self.least_squares.take(&block);
         let Some(last) = self.last.replace(block) else {
             let variance = self.prior.variance(block.n);
@@ -228,6 +228,7 @@ impl ServoFilterBank {
         let density = self.prior.density(speed, pull, jerk);
         let step = FilterStep { dt, forcing: forcing(last, block), density };
         let (y, variance) = (block.deviation_m(), self.prior.variance(block.n));
+        self.path.take(block, variance, density, self.healthy.prior());
         self.healthy.predict(&step);
         self.faulty.predict(&step);
         let faulty = self.faulty.correct(y, variance, dt);
@@ -267,7 +268,7 @@ impl ServoFilterBank {
     /// Resets the evidence: another cause explains it.
     pub fn exonerate(&mut self) {
         self.pause();
-        self.path.clear();
+        self.path.exonerate();
         self.faulty = ServoFilter::new(FAULTY);
         (self.nats, self.rising_since) = (0.0, None);
     }
@@ -293,17 +294,18 @@ impl ServoFilterBank {
         self.nats
     }
 
-    /// Root mean square deviation of the path of the last two seconds from the twin's, m;
-    /// `None` unless the ball could respond all the time.
+    /// Evidence of the path of the last two seconds and of what came before, nats, in which
+    /// the scale of the misfit is the session's own; negative if the path speaks for a
+    /// healthy servo, `None` if unknown.
     #[must_use]
-    pub const fn path_error_m(&self) -> Option<f64> {
-        self.path.error_m()
+    pub const fn path_nats(&self) -> Option<f64> {
+        self.path.nats()
     }
 
-    /// Largest such deviation so far, m.
+    /// Largest such evidence so far, nats.
     #[must_use]
-    pub const fn most_path_error_m(&self) -> f64 {
-        self.path.most_m()
+    pub const fn most_path_nats(&self) -> f64 {
+        self.path.most_nats()
     }
 
     /// Log-likelihood of all readings under the healthy hypothesis, nats, up to a

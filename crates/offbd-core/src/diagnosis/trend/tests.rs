@@ -76,7 +76,7 @@ fn six_sessions_tell_a_drift_of_two_percent() {
 /// Healthy rigs: the fraction with a significant drift is as small as designed, and none
 /// is warned of.
 #[test]
-fn validate_that_no_drift_is_no_warning() {
+fn validate_that_no_drift_is_not_a_warning() {
     let mut drifts = 0;
     for seed in 1..=1000 {
         let mut noise = noise(seed);

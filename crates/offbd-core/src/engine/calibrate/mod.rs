@@ -35,7 +35,8 @@ use spread::{healthy_spread, level_at_rest};
 
 use super::{Misfit, Plausibility, Rig};
 use crate::diagnosis::{
-    AxisCalibration, Calibration, CalibrationOrigin, LeftOut, SensorCalibration, SessionEstimate,
+    AxisCalibration, Calibration, CalibrationOrigin, LeftOut, Prospects, SensorCalibration,
+    SessionEstimate,
 };
 use crate::vocabulary::{Axis, FaultCode, FaultKind, PerAxis, Sample};
 
@@ -96,7 +97,7 @@ pub enum CannotCalibrate {
     Reversed { axis: Axis, gain: f64 },
     #[error(
         "{axis}: the command of {command} explains only {percent:.0} % of the ball's motion, and neither the \
-         other axis nor the opposite sign clearly does: it is noise, drag, stiction or a push by hand; \
+         other axis nor the opposite sign clearly does: noise, drag, stiction or a push by hand; \
          check the sensor, and that the recording is healthy",
         axis = axis.as_str(), command = axis.command()
     )]
@@ -124,6 +125,12 @@ pub enum CannotCalibrate {
         code = code.as_str(), of_kind = kind.map_or(String::new(), |k| format!(" ({})", k.as_str()))
     )]
     AccusesItself { session: usize, code: FaultCode, kind: Option<FaultKind>, at_s: f64 },
+    #[error(
+        "the calibration would be blind: a servo that stopped answering during these recordings would mostly \
+         not be found within 10 s, along either axis; record at least a minute in which the commands \
+         keep the ball rolling along both axes, such as circles or figures, and not a ball that mostly rests"
+    )]
+    Blind,
     #[error("it was stopped before its end")]
     Stopped,
 }
@@ -196,13 +203,14 @@ fn misfit(
     })
 }
 
-/// Returns the cause of `reason` if it is known (swapped axes or a wrong sign), else
+/// Returns the cause of `reason` if it is known (such as swapped axes or a wrong sign), else
 /// `reason`.
 fn with_cause(rig: &Rig, sessions: &[Vec<Sample>], reason: CannotCalibrate) -> CannotCalibrate {
-    let is_cause = |m: Misfit| matches!(m, Misfit::Swapped { .. } | Misfit::WrongSign { .. });
     match reason {
-        CannotCalibrate::Unexplained { .. } | CannotCalibrate::TooLittleExcitation { .. } => {
-            misfit(rig, sessions, is_cause).unwrap_or(reason)
+        CannotCalibrate::Unexplained { .. }
+        | CannotCalibrate::TooLittleExcitation { .. }
+        | CannotCalibrate::TooShort { .. } => {
+            misfit(rig, sessions, Misfit::hinders_learning).unwrap_or(reason)
         }
         other => other,
     }
@@ -275,6 +283,9 @@ pub fn calibrate_with_prospects_while(
     check(go_on)?;
     let learnt = Rig { calibration: Some(Box::new(calibration.clone())), ..rig.clone() };
     calibration.prospects = prospects(&learnt, &sessions);
+    if calibration.prospects.as_ref().is_some_and(Prospects::are_blind) {
+        return Err(CannotCalibrate::Blind);
+    }
     Ok(calibration)
 }
 
@@ -338,7 +349,7 @@ fn learn_in_windows(
         model_error_m_s2: AxisCalibration::assumed_model_error_m_s2(healthy.residual_m_s2),
         familiar_m_s2: healthy.familiar_m_s2,
         most_nats: 0.0,
-        most_path_error_m: 0.0,
+        most_path_nats: None,
     };
     Ok(LearntAxis { calibration, sessions: by_session(&levels, &found) })
 }

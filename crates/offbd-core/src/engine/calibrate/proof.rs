@@ -24,10 +24,6 @@ const MOST_WIDENINGS: usize = 40;
 /// Duration from which on a session is judged by itself if its halves cannot be learnt,
 /// s. Chosen.
 const LONG_S: f64 = 60.0;
-/// Margin on the largest deviation of the path in one test, as a fraction; it is divided
-/// by the number of tests, since the largest of few is likely to be exceeded. Chosen, not
-/// measured: a fifth for three tests, hardly anything for twenty.
-const FEW_TESTS: f64 = 0.6;
 /// Largest scatter that is taken over from the tests, m: more is not noise but motion
 /// that the fit does not follow. Chosen.
 const MOST_SCATTER_M: f64 = 1e-3;
@@ -126,9 +122,8 @@ fn leave_out(
 fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     for axis in Axis::ALL {
         let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
-        let seen_m = tests.iter().map(|t| t.most_path_error_m[axis]).fold(0.0, f64::max);
-        let most_path_error_m = seen_m * (1.0 + FEW_TESTS / tests.len() as f64);
-        let with = |a| AxisCalibration { most_nats, most_path_error_m, ..a };
+        let most_path_nats = tests.iter().map(|t| t.most_path_nats[axis]).reduce(f64::max);
+        let with = |a| AxisCalibration { most_nats, most_path_nats, ..a };
         learnt.axes[axis] = learnt.axes[axis].map(with);
     }
     let most = |of: fn(&SelfTest) -> f64| tests.iter().map(of).fold(0.0, f64::max);

@@ -49,11 +49,11 @@ fn motion_that_the_command_does_not_explain_is_told_by_its_cause() {
             s.y_m = Some(0.05 * (2.3 * s.t_s).cos());
         })],
     );
-    assert!(noise.contains("it is noise, drag, stiction"), "{noise}");
+    assert!(noise.contains("clearly does: noise, drag, stiction"), "{noise}");
 }
 
 #[test]
-fn no_refusal_shows_what_is_no_number() {
+fn no_refusal_shows_what_is_not_a_number() {
     for percent in [f64::NAN, f64::INFINITY] {
         let words = CannotCalibrate::TooLittleExcitation { axis: Axis::X, percent }.to_string();
         assert!(!words.contains("NaN") && !words.contains("inf"), "{words}");

@@ -20,8 +20,8 @@ pub(super) struct SelfTest {
     pub(super) alarm: Option<Accusation>,
     /// Largest evidence against each servo, nats, and its time, s.
     pub(super) most_nats: PerAxis<(f64, f64)>,
-    /// Largest deviation of the path of each axis from the twin's, m.
-    pub(super) most_path_error_m: PerAxis<f64>,
+    /// Largest evidence of the path of each axis, nats.
+    pub(super) most_path_nats: PerAxis<f64>,
     pub(super) most_outliers: f64,
     /// Largest scatter that persisted, m.
     pub(super) most_scatter_m: f64,
@@ -67,7 +67,7 @@ pub(super) fn judge(setup: &Setup, session: usize, samples: &[Sample]) -> SelfTe
         session,
         alarm,
         most_nats: nats,
-        most_path_error_m: engine.most_path_error_m(),
+        most_path_nats: engine.most_path_nats(),
         most_outliers,
         most_scatter_m: scatter.most,
         nearest: engine.nearest(),

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_estimate_may_be_off_by_is_no_spread() {
+    fn what_an_estimate_may_be_off_by_is_not_a_spread() {
         let values: Vec<f64> = (0..40).map(|i| if i % 2 == 0 { 0.05 } else { -0.05 }).collect();
         let found = session_spread(&estimates(&values, 0.05), &POPULATION).unwrap();
         assert!(found.deviation < 0.03, "{found:?}");

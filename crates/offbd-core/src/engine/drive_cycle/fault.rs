@@ -84,12 +84,12 @@ impl TriedFault {
         const ANY: Effect = Effect::HEALTHY;
         match self {
             Self::HalfGain(axis) => {
-                let words = ["the x servo answers half", "the y servo answers half"];
+                let words = ["half response of the x servo", "half response of the y servo"];
                 let effect = Effect::answers(axis, HALF_GAIN);
                 (FaultCode::servo(axis), Some(FaultKind::Gain), words[axis as usize], effect)
             }
             Self::Dead(axis) => {
-                let words = ["the x servo does not answer", "the y servo does not answer"];
+                let words = ["no response of the x servo", "no response of the y servo"];
                 let effect = Effect::answers(axis, 0.0);
                 (FaultCode::servo(axis), Some(FaultKind::Dead), words[axis as usize], effect)
             }

@@ -108,8 +108,8 @@ pub enum NoDriveCycle {
     #[error(transparent)]
     Invalid(#[from] Invalid),
     #[error(
-        "/calibration: the rig is not learnt, so neither its servos nor its ball can be tested; \
-         learn it from a minute or two in which the ball rolls, then ask again"
+        "/calibration: the rig is not calibrated, so neither its servos nor its ball can be tested; \
+         calibrate it on a minute or two in which the ball rolls, then ask again"
     )]
     NotLearnt,
     #[error(

@@ -14,9 +14,9 @@ use crate::vocabulary::{Axis, PerAxis};
 /// The timing of both axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Both at once: a ball that stands is then stuck, whatever the servos do.
+    /// Both axes at once: a ball that stands is then stuck, whatever the servos do.
     AtOnce,
-    /// Both, with y a quarter of a period after x.
+    /// Both axes, y a quarter of a period after x.
     Staggered,
     /// First x, then y.
     InTurn,

@@ -22,7 +22,7 @@ const GOOD: AxisCalibration = AxisCalibration {
     residual_m_s2: 0.004,
     model_error_m_s2: 0.01,
     most_nats: 0.5,
-    most_path_error_m: 0.0,
+    most_path_nats: None,
     familiar_m_s2: 0.3,
 };
 
@@ -99,8 +99,8 @@ fn an_axis_that_is_not_learnt_is_named_and_not_moved() {
 #[test]
 fn a_rig_without_a_cycle_is_told_why() {
     let why = |rig: Rig| drive_cycle(&rig).unwrap_err().to_string();
-    assert!(why(Rig::chapter("a")).starts_with("/calibration: the rig is not learnt"));
-    assert!(why(learnt(None, None)).starts_with("/calibration: the rig is not learnt"));
+    assert!(why(Rig::chapter("a")).starts_with("/calibration: the rig is not calibrated"));
+    assert!(why(learnt(None, None)).starts_with("/calibration: the rig is not calibrated"));
     let tiny = Rig { plate: plate(0.2, 0.03), ..good() };
     assert_eq!(why(tiny), "/plate: it leaves the ball 0.0 mm along y, less than a motion takes");
     let sticky = AxisCalibration { breakaway_rad: 0.15, ..GOOD };

@@ -7,6 +7,7 @@
 
 mod period;
 mod response;
+mod scatter;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +15,7 @@ mod tests;
 use crate::no_std::*;
 use period::Periods;
 use response::{AxisResponse, ResponseCorrelator};
+use scatter::ReadingScatter;
 use serde::{Deserialize, Serialize};
 
 use super::Rig;
@@ -30,6 +32,10 @@ const RATE_FACTOR: f64 = 3.0;
 const MAJORITY: f64 = 0.5;
 /// Fraction that must fit with another unit for that unit to be suggested. Chosen.
 const FITTING_SHARE: f64 = 0.9;
+/// Factor between the stated and the measured sample rate up to which the clock is not in doubt.
+/// Chosen: a clock that runs wrong by a factor changes the motion by its square, here 2.25, which is
+/// far from 10.
+const SAME_RATE_FACTOR: f64 = 1.5;
 /// Factor by which positions must exceed the plate to count as far off. Chosen: a plate
 /// measured wrong by as much is less likely than another unit.
 const FAR_FACTOR: f64 = 5.0;
@@ -46,6 +52,12 @@ const LEAST_SESSION_S: f64 = 3.0;
 /// Position units other than the stated one, in terms of it: centimetres and millimetres
 /// for metres.
 const POSITION_UNITS: [f64; 2] = [0.01, 0.001];
+/// Factors by which positions are too small if they are read in a unit that is too small: mm for
+/// cm, mm for m, and one between them.
+const SCALES: [f64; 3] = [10.0, 100.0, 1000.0];
+/// Largest factor between the motion and a tenth (and so on) of what is expected: a quarter of a
+/// decade, 10^0.25. Chosen: half the distance at which another power of ten is as near.
+const SCALE_FACTOR: f64 = 1.778;
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
@@ -114,6 +126,33 @@ pub enum Misfit {
         axis = axis.as_str(), command = axis.command()
     )]
     WrongSign { axis: Axis, sign: f64 },
+    #[error(
+        "the motion is {:.2} of what the commands ask{}: are the positions {factor} times as large \
+         (axes.position_unit_m {} instead of {unit_m})?",
+        digits(*ratio), if *scattered { ", and the readings scatter as much less" } else { "" },
+        digits(factor * unit_m)
+    )]
+    Scale {
+        /// The motion over what the commands ask, the geometric mean over the axes.
+        ratio: f64,
+        /// Factor that would explain it.
+        factor: f64,
+        /// The stated unit of positions, m.
+        unit_m: f64,
+        /// Whether the readings also scatter less than those of the calibration, which no fault of
+        /// the servos explains.
+        scattered: bool,
+    },
+    #[error(
+        "at {:.0} % of the positions the ball, {radius_m} m in radius, would touch the edge of the plate of \
+         the asset file: is the radius or the plate wrong?",
+        100.0 * share
+    )]
+    NoRoom {
+        /// Fraction of the positions at which the ball would touch the edge.
+        share: f64,
+        radius_m: f64,
+    },
 }
 
 impl Misfit {
@@ -132,6 +171,8 @@ impl Misfit {
             Self::OneAxis { .. } => "one_axis",
             Self::Swapped { .. } => "swapped",
             Self::WrongSign { .. } => "wrong_sign",
+            Self::Scale { .. } => "scale",
+            Self::NoRoom { .. } => "no_room",
         }
     }
 
@@ -144,6 +185,26 @@ impl Misfit {
                 | Self::OneAxis { .. }
                 | Self::Swapped { .. }
                 | Self::WrongSign { .. }
+                | Self::Scale { scattered: false, .. }
+                | Self::NoRoom { .. }
+        )
+    }
+
+    /// Whether it explains the evidence against a servo as well as a fault of the servo does.
+    #[must_use]
+    pub const fn excuses_servos(self) -> bool {
+        matches!(self, Self::Scale { scattered: true, .. })
+    }
+
+    /// Whether it can be the reason why a rig cannot be learnt from a session.
+    #[must_use]
+    pub const fn hinders_learning(self) -> bool {
+        matches!(
+            self,
+            Self::Swapped { .. }
+                | Self::WrongSign { .. }
+                | Self::Scale { .. }
+                | Self::NoRoom { .. }
         )
     }
 
@@ -212,6 +273,8 @@ impl Count {
 struct PositionCounts {
     outside: Count,
     far: Count,
+    /// Where the ball would touch the edge.
+    at_edge: Count,
     /// On the plate with each of [`POSITION_UNITS`].
     fit: [Count; POSITION_UNITS.len()],
 }
@@ -234,18 +297,26 @@ struct SeenAxis {
     n_commands: u32,
 }
 
+/// What the calibration of a rig tells of an axis.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct CalibratedAxis {
+    gain: f64,
+    noise_m: f64,
+}
+
 /// The comparison of one session's samples with the description of its rig.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Plausibility {
     rig: Rig,
-    /// The axes in the rig's calibration, if there is one.
-    learnt: Option<PerAxis<bool>>,
+    /// The rig's calibration, if there is one.
+    learnt: Option<PerAxis<Option<CalibratedAxis>>>,
     span_s: Option<(f64, f64)>,
     periods: Periods,
     places: PositionCounts,
     sizes: CommandCounts,
     seen: PerAxis<SeenAxis>,
     responses: ResponseCorrelator,
+    scatter: PerAxis<ReadingScatter>,
 }
 
 impl Plausibility {
@@ -254,13 +325,16 @@ impl Plausibility {
     pub fn new(rig: &Rig) -> Self {
         Self {
             responses: ResponseCorrelator::new(rig.sample_rate_hz),
-            learnt: rig.calibration.as_ref().map(|c| c.axes.map(|axis| axis.is_some())),
+            learnt: rig.calibration.as_ref().map(|c| {
+                c.axes.map(|axis| axis.map(|a| CalibratedAxis { gain: a.gain, noise_m: a.noise_m }))
+            }),
             rig: Rig { calibration: None, ..rig.clone() },
             span_s: None,
             periods: Periods::default(),
             places: PositionCounts::default(),
             sizes: CommandCounts::default(),
             seen: PerAxis::default(),
+            scatter: PerAxis::default(),
         }
     }
 
@@ -286,6 +360,11 @@ impl Plausibility {
         let at = |axis: Axis| moment.position[axis].unwrap_or(0.0);
         if plate.edge_distance_m(at(Axis::X), at(Axis::Y)) < self.rig.contact_room_m() {
             moment.position = PerAxis::default();
+        }
+        for axis in Axis::ALL {
+            if let Some(CalibratedAxis { noise_m, .. }) = self.learnt_axis(axis) {
+                self.scatter[axis].take(moment.position[axis], noise_m);
+            }
         }
         self.responses.take(&moment);
     }
@@ -318,6 +397,7 @@ impl Plausibility {
         let fits = |unit: f64| plate.edge_distance_m(unit * x, unit * y) >= out_m;
         self.places.outside.take(!fits(1.0));
         self.places.far.take(!fits(1.0 / FAR_FACTOR));
+        self.places.at_edge.take(plate.edge_distance_m(x, y) < self.rig.ball.radius_m());
         for (count, unit) in self.places.fit.iter_mut().zip(POSITION_UNITS) {
             count.take(fits(unit));
         }
@@ -344,6 +424,7 @@ impl Plausibility {
         if found.is_empty() {
             found.extend([self.short(), self.held(), self.one_axis()].into_iter().flatten());
             found.extend(self.answers());
+            found.extend([self.scale(), self.no_room()].into_iter().flatten());
         }
         found
     }
@@ -401,7 +482,7 @@ impl Plausibility {
 
     /// A missing axis, unless the calibration lacks it, too.
     fn one_axis(&self) -> Option<Misfit> {
-        let known = |axis: Axis| self.learnt.is_none_or(|learnt| learnt[axis]);
+        let known = |axis: Axis| self.learnt.is_none_or(|learnt| learnt[axis].is_some());
         let lacks = |&axis: &Axis| {
             known(axis) && !(self.seen[axis].read && self.seen[axis].command.is_some())
         };
@@ -423,5 +504,42 @@ impl Plausibility {
         }
         let sign = |axis: Axis| Misfit::WrongSign { axis, sign: self.rig.mapping.sign[axis] };
         are(AxisResponse::Against).map(sign).collect()
+    }
+
+    /// Positions that are too small by a power of ten: along each axis the ball responds to its own
+    /// command that much less than it should.
+    fn scale(&self) -> Option<Misfit> {
+        let rate = self.periods.median_s(LEAST_COUNT)? * self.rig.sample_rate_hz;
+        if rate.ln().abs() > SAME_RATE_FACTOR.ln() {
+            return None;
+        }
+        let asked = self.rig.ball.rolling_gravity();
+        let mut ratios = Vec::new();
+        for axis in Axis::ALL {
+            let seen = &self.seen[axis];
+            if seen.read && seen.changed {
+                let gain = self.responses.slope_m_s2(axis)? / asked;
+                ratios.push(gain / self.learnt_axis(axis).map_or(1.0, |learnt| learnt.gain));
+            }
+        }
+        let scale = SCALES.iter().position(|factor| {
+            let near = |ratio: &f64| (ratio * factor).ln().abs() <= SCALE_FACTOR.ln();
+            !ratios.is_empty() && ratios.iter().all(near)
+        })?;
+        let mean = ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64;
+        let smaller = Axis::ALL.map(|axis| self.scatter[axis].is_smaller(scale));
+        let scattered = smaller.contains(&Some(true)) && !smaller.contains(&Some(false));
+        let factor = SCALES[scale];
+        let unit_m = self.rig.mapping.position_unit_m;
+        Some(Misfit::Scale { ratio: mean.exp(), factor, unit_m, scattered })
+    }
+
+    fn learnt_axis(&self, axis: Axis) -> Option<CalibratedAxis> {
+        self.learnt.and_then(|learnt| learnt[axis])
+    }
+
+    fn no_room(&self) -> Option<Misfit> {
+        let share = self.places.at_edge.share().filter(|&share| share > MAJORITY)?;
+        Some(Misfit::NoRoom { share, radius_m: self.rig.ball.radius_m() })
     }
 }

@@ -97,6 +97,12 @@ impl Correlation {
         let value = (self.products - a * b / self.n) / (spread(0) * spread(1)).sqrt();
         if self.n >= LEAST_DIFFERENCES && value.is_finite() { value } else { 0.0 }
     }
+
+    /// The first variable per unit of the second, by least squares.
+    fn slope(&self) -> f64 {
+        let [a, b] = self.sums;
+        (self.products - a * b / self.n) / (self.squares[1] - b * b / self.n)
+    }
 }
 
 /// Correlations of the motion along one axis with both commands, for each delay.
@@ -189,12 +195,27 @@ impl ResponseCorrelator {
         Some(sum)
     }
 
+    /// The correlation of the motion along `axis` with the command of `of`, with the delay that
+    /// explains most.
+    fn best(&self, axis: Axis, of: Axis) -> &Correlation {
+        let tried = &self.tried[axis][of];
+        tried
+            .iter()
+            .fold(&tried[0], |best, c| if c.value().abs() > best.value().abs() { c } else { best })
+    }
+
+    /// Acceleration along `axis` per radian of its own command, m/s²; `None` if no clear response of
+    /// the ball to it is seen.
+    pub(super) fn slope_m_s2(&self, axis: Axis) -> Option<f64> {
+        // The weights of the positions and of the commands are those of the same triangle.
+        let per_block = self.best(axis, axis).slope() * axis.drive_sign();
+        (self.answers(axis) == AxisResponse::Own)
+            .then_some(per_block / (self.block_s * self.block_s))
+    }
+
     /// Returns the command that the motion along `axis` responds to.
     pub(super) fn answers(&self, axis: Axis) -> AxisResponse {
-        let best = |of: Axis| {
-            let values = self.tried[axis][of].iter().map(Correlation::value);
-            values.fold(0.0, |best: f64, r| if r.abs() > best.abs() { r } else { best })
-        };
+        let best = |of: Axis| self.best(axis, of).value();
         let (own, other) = (best(axis) * axis.drive_sign(), best(axis.other()));
         let clear =
             |r: f64, rival: f64| r * r >= CLEAR_SHARE && rival * rival <= RIVAL_SHARE * r * r;

@@ -75,7 +75,7 @@ fn commands_in_degrees_are_named() {
 }
 
 #[test]
-fn a_limit_entered_too_small_is_no_question_of_degrees() {
+fn a_limit_entered_too_small_is_not_a_question_of_degrees() {
     let mut rig = Rig::chapter("a");
     rig.servo.angle_limit_rad = 0.003;
     let found = Plausibility::of(&rig, &changed(|_| {})).misfits();
@@ -113,7 +113,7 @@ fn a_calibration_answers_for_the_axes() {
 }
 
 #[test]
-fn motion_that_answers_nothing_is_no_question_of_axes() {
+fn motion_that_answers_nothing_is_not_a_question_of_axes() {
     // A sensor that sways by itself, unrelated to any command.
     let noise = changed(|s| {
         s.x_m = Some(0.05 * (1.9 * s.t_s).sin());
@@ -149,4 +149,71 @@ fn the_order_of_the_rows_and_gaps_do_not_matter() {
     rows.drain(900..1400);
     rows.iter_mut().skip(1200).for_each(|s| s.t_s += 1e9);
     assert_eq!(misfits(&rows), []);
+}
+
+/// Readings a tenth of what they should be, as from centimetres read as millimetres.
+fn a_tenth(s: &mut Sample) {
+    scale(&mut s.x_m, 0.1);
+    scale(&mut s.y_m, 0.1);
+}
+
+#[test]
+fn positions_in_a_unit_that_is_too_small_are_named() {
+    let words = "the motion is 0.09 of what the commands ask: are the positions 10 times as large \
+                 (axes.position_unit_m 10 instead of 1)?";
+    assert_eq!(said(&changed(a_tenth)), words);
+    let found = misfits(&changed(|s| {
+        a_tenth(s);
+        a_tenth(s);
+    }));
+    assert!(matches!(found[..], [Misfit::Scale { factor: 100.0, .. }]), "{found:?}");
+    // One axis alone is not a question of units, nor is an answer of a third.
+    assert_eq!(misfits(&changed(|s| scale(&mut s.x_m, 0.1))), []);
+    let weak = changed(|s| {
+        scale(&mut s.x_m, 0.3);
+        scale(&mut s.y_m, 0.3);
+    });
+    assert_eq!(misfits(&weak), []);
+}
+
+/// A fault of both servos leaves the scatter of the readings as it was; a wrong unit does not.
+#[test]
+fn the_scatter_tells_a_unit_from_weak_servos() {
+    let noise = core::cell::Cell::new(1_u64);
+    let next = || {
+        noise.set(noise.get().wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1));
+        (noise.get() >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    };
+    let noisy = |s: &mut Sample| {
+        for value in [&mut s.x_m, &mut s.y_m].into_iter().flatten() {
+            *value += 1e-3 * next();
+        }
+    };
+    let healthy = changed(noisy);
+    let mut rig = Rig::chapter("a");
+    rig.calibration =
+        Some(Box::new(crate::engine::calibrate(&rig, core::slice::from_ref(&healthy)).unwrap()));
+    let scattered = |samples: &[Sample]| match Plausibility::of(&rig, samples).misfits()[..] {
+        [Misfit::Scale { factor: 10.0, scattered, .. }] => Some(scattered),
+        _ => None,
+    };
+    assert_eq!(scattered(&healthy), None);
+    let unit = changed(|s| {
+        noisy(s);
+        a_tenth(s);
+    });
+    assert_eq!(scattered(&unit), Some(true));
+    let weak = changed(|s| {
+        a_tenth(s);
+        noisy(s);
+    });
+    assert_eq!(scattered(&weak), Some(false));
+}
+
+#[test]
+fn a_ball_that_does_not_fit_its_plate_is_named() {
+    let mut rig = Rig::chapter("a");
+    rig.ball = crate::plant::Ball::new(0.12, 0.051, 0.4).unwrap();
+    let found = Plausibility::of(&rig, &changed(|_| {})).misfits();
+    assert!(matches!(found[..], [Misfit::NoRoom { radius_m: 0.12, .. }]), "{found:?}");
 }

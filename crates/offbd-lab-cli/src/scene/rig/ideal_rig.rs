@@ -203,7 +203,7 @@ impl ProfileVerdict {
             |faults: &[ReportedFault]| faults.iter().map(named).collect::<Vec<_>>().join(", ");
         match (&self.faults[..], &self.pending[..]) {
             ([], []) => "nothing".to_owned(),
-            ([], pending) => format!("{}, pending: the rig is not learnt", list(pending)),
+            ([], pending) => format!("{}, suspected: the rig is not calibrated", list(pending)),
             (faults, _) => list(faults),
         }
     }

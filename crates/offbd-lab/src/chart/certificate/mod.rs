@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::{Chart, ChartError, Effort};
 
-/// The extent of the measurement.
+/// How many rigs and hours are simulated.
 struct CertificatePlan {
     /// Number of rigs drawn.
     n_rigs: u64,

@@ -10,7 +10,7 @@ use offbd_core::vocabulary::{Axis, FaultCode, PerAxis};
 const DRIFTS: [f64; 2] = [0.5, 3.0];
 
 /// Maximum interval that one time counts for in the debounce, s; chosen: a gap in the log
-/// is no evidence.
+/// is not evidence.
 const LONGEST_S: f64 = 0.2;
 
 /// A method that detects servo faults, with one threshold.
@@ -79,7 +79,7 @@ impl DetectionMethod {
 /// The chapter's limit of the residual, m/s² (application 3).
 pub(super) const CHAPTER_M_S2: f64 = 0.01;
 
-/// A method at a threshold.
+/// A method that reports a fault beyond a threshold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Detector {
     pub(super) method: DetectionMethod,

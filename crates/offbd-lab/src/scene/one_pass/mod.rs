@@ -69,7 +69,7 @@ impl OnePass {
 
 /// No way to keep the tolerance.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("no model keeps {tolerance_m:e} m here: {why}")]
+#[error("no model stays within {tolerance_m:e} m here: {why}")]
 pub struct Declined {
     pub tolerance_m: f64,
     pub why: String,
@@ -131,7 +131,7 @@ pub fn one_pass<D: Drive + Clone>(
     Ok(left.then(Model::Compliant, by.method(), run))
 }
 
-/// Begins a stage. A better model from the same time on replaces the cheaper one.
+/// Begins a stage. It replaces the last stage if both begin at the same time.
 fn enter(stages: &mut Vec<Stage>, stage: Stage) {
     stages.pop_if(|last| last.from_s == stage.from_s);
     stages.push(stage);

@@ -73,7 +73,7 @@ fn fingerprint(samples: &[Sample]) -> u64 {
     numbers.fold(0xcbf2_9ce4_8422_2325, |hash, bits| (hash ^ bits).wrapping_mul(0x100_0000_01b3))
 }
 
-/// The samples of a seed must not change: new properties draw from streams of their own.
+/// The samples of a seed must not change: new properties draw from their own streams.
 #[test]
 fn regress_the_presets_samples() {
     let disturbances = Disturbances { pushes_per_minute: 5.0, gusts_per_minute: 3.0 };

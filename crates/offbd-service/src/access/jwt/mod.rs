@@ -65,7 +65,7 @@ pub enum JwtError {
     Claim(&'static str),
     #[error("no role of this service in the role claim")]
     Role,
-    #[error("no asset in the token of a device")]
+    #[error("the token of a device names no asset")]
     Asset,
 }
 

@@ -178,9 +178,17 @@ impl Check<'_> {
         }
         let best = self.candidates(axis, ratio);
         let Some((position, command)) = best else {
+            let factor = 10_f64.powf(-ratio.log10().round());
+            let likely = if (ratio * factor).ln().abs() < UNIT_FACTOR.ln() / 2.0 {
+                format!(
+                    ": no unit of the quantities explains that, a factor of {factor} of the \
+                     positions does"
+                )
+            } else {
+                ", and no other unit explains that".to_owned()
+            };
             self.view.remark(format!(
-                "the motion along {} is {:.2} of what the commands ask, and no other unit explains \
-                 that",
+                "the motion along {} is {:.2} of what the commands ask{likely}",
                 axis.word, ratio
             ));
             return;
@@ -225,7 +233,7 @@ impl Check<'_> {
             let units = Dimension::of(quantity).units().iter().filter_map(|(word, si)| {
                 let change = si / factor?;
                 let largest = self.largest[quantity] * change;
-                let is_usual = largest >= usual.0 && largest <= usual.1;
+                let is_usual = largest >= usual.0 && largest <= usual.1 && *word != "turn";
                 (!is_fixed && is_usual || change == 1.0).then_some((*word, change))
             });
             let found: Vec<_> = units.collect();

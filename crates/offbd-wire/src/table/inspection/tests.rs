@@ -79,6 +79,14 @@ fn the_motion_decides_units_signs_and_axes() {
         "t_s=t/s, cmd_qx_rad=pitch/rad, cmd_qy_rad=-roll/rad, x_m=x/m, y_m=y/m"
     );
     assert_eq!(remarks(&view), Vec::<String>::new());
+    // Commands whose names say no axis.
+    for (header, mapping) in [
+        ("t;servo_1;servo_2;x;y", "cmd_qx_rad=servo_2/rad, cmd_qy_rad=servo_1/rad"),
+        ("t;servo_1;servo_2;y;x", "cmd_qx_rad=-servo_1/rad, cmd_qy_rad=-servo_2/rad"),
+    ] {
+        let view = inspected(header, [1.0; 5], "");
+        assert_eq!(view.mapping, format!("t_s=t/s, {mapping}, x_m=x/m, y_m=y/m"));
+    }
 }
 
 /// One axis whose servo is dead says nothing of its unit; the other one does.
@@ -115,7 +123,8 @@ fn what_is_stated_is_not_changed_but_doubted() {
     assert_eq!(remarks(&view), [asked("x"), asked("y")]);
     let header = "t_s;cmd_qy_rad;cmd_qx_rad;x_m;y_m";
     let view = inspected(header, [1.0, 1.0, 1.0, 0.1, 0.1], "");
-    assert!(remarks(&view)[0].contains("is 0.10 of what the commands ask"), "{:?}", view.remarks);
+    let factor = "no unit of the quantities explains that, a factor of 10 of the positions does";
+    assert!(remarks(&view)[0].contains(factor), "{:?}", view.remarks);
     let view = inspected(header, [1.0, 1.0, -1.0, 1.0, 1.0], "");
     let against = "the ball moves along y against `cmd_qx_rad`: is a sign wrong? \
         [cmd_qx_rad=-cmd_qx_rad/rad]";
@@ -156,4 +165,17 @@ fn a_quantity_that_is_left_out_is_not_guessed() {
     let all = "cmd_qx_rad=none, cmd_qy_rad=none, x_m=none, y_m=none";
     let view = inspected("t_s;cmd_qy_rad;cmd_qx_rad;x_m;y_m", [1.0; 5], all);
     assert!(remarks(&view)[0].contains("no column is likely to be `x_m`"), "{:?}", view.remarks);
+}
+
+#[test]
+fn pixels_and_counts_are_not_lengths() {
+    let header = "t_s;pitch_deg;roll_deg;ball_x_px;ball_y_px";
+    let factors = [1.0, DEG, DEG, 2000.0, 2000.0];
+    let view = inspected(header, factors, "");
+    assert!(!view.mapping.contains("_px"), "{}", view.mapping);
+    let told = "pixels and counts need a factor and an offset, such as \
+                `x_m=ball_x_px*0.0005-0.16`: `ball_x_px`, `ball_y_px`";
+    assert!(remarks(&view)[0].starts_with(told), "{:?}", view.remarks);
+    let view = inspected(header, factors, "x_m=ball_x_px*0.0005, y_m=ball_y_px*0.0005");
+    assert_eq!(remarks(&view), Vec::<String>::new());
 }

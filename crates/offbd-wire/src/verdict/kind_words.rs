@@ -1,0 +1,55 @@
+//! The kind of a fault in words, as a fact or as probable with its weight, and its status.
+
+use offbd_core::vocabulary::FaultStatus;
+use std::fmt::Display;
+
+/// Weight from which on a kind is stated as a fact. Chosen: at most one in five of these kinds
+/// is another one. The page has the same limit.
+const SURE: f64 = 0.8;
+
+/// Whether a kind with this weight is only probable.
+#[must_use]
+pub fn is_probable(weight: f64) -> bool {
+    weight < SURE
+}
+
+/// Returns a kind as a word for people: `dead`, or `probably dead, 51 %`.
+pub fn kind_words(kind: impl Display, weight: f64) -> String {
+    match is_probable(weight) {
+        true => format!("probably {kind}, {:.0} %", 100.0 * weight),
+        false => kind.to_string(),
+    }
+}
+
+/// Returns a fault with its kind, if it is known: `x_servo (probably dead, 51 %)`.
+pub fn fault_title(code: impl Display, kind: Option<impl Display>, weight: f64) -> String {
+    match kind {
+        Some(kind) => format!("{code} ({})", kind_words(kind, weight)),
+        None => code.to_string(),
+    }
+}
+
+/// Returns a status as a word for people, who know a pending fault as a suspected one.
+#[must_use]
+pub fn status_words(status: FaultStatus) -> &'static str {
+    match status {
+        FaultStatus::Pending => "suspected",
+        FaultStatus::Confirmed => "confirmed",
+        FaultStatus::Healed => "healed",
+        FaultStatus::Cleared => "cleared",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_is_a_fact_from_four_fifths_on() {
+        assert_eq!(kind_words("dead", 0.512), "probably dead, 51 %");
+        assert_eq!(kind_words("dead", 0.79), "probably dead, 79 %");
+        assert_eq!(kind_words("dead", 0.8), "dead");
+        assert_eq!(fault_title("x_servo", Some("dead"), 1.0), "x_servo (dead)");
+        assert_eq!(fault_title("x_servo", None::<&str>, 0.0), "x_servo");
+    }
+}
