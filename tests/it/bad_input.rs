@@ -141,6 +141,9 @@ async fn an_invalid_row_is_rejected_and_the_rest_of_the_batch_accepted() {
     let ack = client.post_text(path, "text/csv", table).await.expect(200);
     assert_eq!(ack["accepted"], 2);
     assert!(ack["rejected"][0]["reason"].as_str().unwrap().contains("line 3"), "{ack}");
+    let lines_as_table = format!("{path}&columns=t_s%3Dtime");
+    let refused = client.post_text(&lines_as_table, "application/x-ndjson", lines).await;
+    assert_eq!(refused.problem(400)["parameter"], "columns");
 }
 
 #[tokio::test]

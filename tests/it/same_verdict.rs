@@ -1,7 +1,9 @@
 //! One session sent over every transport and in every format gives the same recording and the
 //! same verdict.
 
-use crate::support::{Client, ServiceFixture, batch, columns, csv, judged, learnt, packed, rig};
+use crate::support::{
+    Client, ServiceFixture, batch, columns, csv, judged, learnt, packed, registration, rig,
+};
 use futures_util::{SinkExt, StreamExt};
 use offbd::wire::asset::view;
 use offbd_core::vocabulary::Sample;
@@ -30,12 +32,19 @@ async fn every_transport_and_format_gives_the_same_recording_and_verdict() {
         "packed",
         "lines",
         "csv",
+        "other-names",
+        "mapped",
         "socket",
         "packed-socket",
         "imported",
     ];
+    let mapping = "t_s=time,cmd_qx_rad=tilt_x,cmd_qy_rad=tilt_y,x_m='ball x',y_m='ball y'";
     for asset in assets {
-        client.asset(asset).await;
+        let mut body = registration(asset);
+        if asset == "mapped" {
+            body["columns"] = json!(mapping);
+        }
+        client.post("assets", &body).await.expect(201);
     }
     for sample in &samples {
         client.telemetry("ones", Some("s"), std::slice::from_ref(sample)).await;
@@ -49,6 +58,12 @@ async fn every_transport_and_format_gives_the_same_recording_and_verdict() {
         assert_eq!(without_session_id(packed.expect(200)), without_session_id(text));
         let path = "assets/csv/telemetry?session=s";
         client.post_text(path, "text/csv", csv(part)).await.expect(200);
+        let table = with_other_names(part);
+        let path = "assets/mapped/telemetry?session=s";
+        let ack = client.post_text(path, "text/csv", table.clone()).await.expect(200);
+        assert_eq!(ack.get("unknown"), None, "{ack}");
+        let path = format!("assets/other-names/telemetry?session=s&columns={}", escaped(mapping));
+        client.post_text(&path, "text/csv", table).await.expect(200);
         let path = "assets/lines/telemetry?session=s";
         client.post_text(path, "application/x-ndjson", lines(part)).await.expect(200);
     }
@@ -64,6 +79,30 @@ async fn every_transport_and_format_gives_the_same_recording_and_verdict() {
         assert_eq!(recording, samples, "{asset}");
     }
     assert_eq!(hash_by_command_line(&samples), hash);
+}
+
+/// The samples as CSV with other names, and with a column that is not read.
+fn with_other_names(samples: &[Sample]) -> String {
+    let (mut text, table) = (String::new(), csv(samples));
+    for (i, line) in table.lines().enumerate() {
+        text += if i == 0 { "row," } else { "7," };
+        text += &match i {
+            0 => line
+                .replace("t_s", "time")
+                .replace("cmd_qx_rad", "tilt_x")
+                .replace("cmd_qy_rad", "tilt_y")
+                .replace("x_m", "ball x")
+                .replace("y_m", "ball y"),
+            _ => line.to_owned(),
+        };
+        text += "\n";
+    }
+    text
+}
+
+/// Escapes a mapping for a query.
+fn escaped(mapping: &str) -> String {
+    mapping.replace('=', "%3D").replace(' ', "%20").replace(',', "%2C")
 }
 
 /// Returns an acknowledgement without the session's id, which differs between assets.

@@ -89,6 +89,7 @@ use self::guard::Guard;
 use self::routes::RouteRules;
 use offbd_core::vocabulary::{Invalid, TimeRange, UnknownWord};
 use offbd_service::{Service, parse_timestamp};
+use offbd_wire::table::{ColumnMapping, MappingError};
 
 /// The state shared by all handlers.
 #[derive(Clone)]
@@ -165,6 +166,15 @@ fn query_word<T: FromStr<Err = UnknownWord>>(
 ) -> Result<Option<T>, Problem> {
     let word = word.map(str::parse).transpose();
     Ok(word.map_err(|error: UnknownWord| Invalid::new(name, error.to_string()))?)
+}
+
+/// Parses the query parameter `columns`.
+///
+/// # Errors
+/// A [`Problem`] with the reason.
+fn query_columns(mapping: Option<&str>) -> Result<ColumnMapping, Problem> {
+    let parsed = mapping.unwrap_or_default().parse();
+    Ok(parsed.map_err(|error: MappingError| Invalid::new("?columns", error.to_string()))?)
 }
 
 /// Parses the query parameter `name`, a time (RFC 3339), to microseconds since 1970.

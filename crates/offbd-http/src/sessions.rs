@@ -17,14 +17,14 @@ use super::import_files::{BodyKind, File};
 use super::json_body::JsonBody;
 use super::session_format::BinaryFile;
 use super::{
-    App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_time, query_word,
-    session_format, time_range,
+    App, AssetPath, PageQuery, Path, Problem, Query, body, page_limit, query_columns, query_time,
+    query_word, session_format, time_range,
 };
 use offbd_core::vocabulary::{Invalid, in_range};
 use offbd_service::{RecordingReader, Route, Service, ServiceError, SessionListQuery};
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use offbd_wire::session_file::{SessionFormat, SessionWriter};
-use offbd_wire::table::{InspectionView, MappingError, RATES_HZ, TableOptions};
+use offbd_wire::table::{InspectionView, RATES_HZ, TableOptions};
 use offbd_wire::verdict::FaultView;
 use offbd_wire::words::{SessionSort, SessionState, VerdictFilter};
 
@@ -117,10 +117,7 @@ impl ImportQuery {
     }
 
     fn options(&self) -> Result<TableOptions, Problem> {
-        let columns = self.columns.as_deref().unwrap_or_default();
-        let columns = columns
-            .parse()
-            .map_err(|error: MappingError| Invalid::new("?columns", error.to_string()))?;
+        let columns = query_columns(self.columns.as_deref())?;
         if let Some(rate) = self.rate {
             in_range("?rate", rate, RATES_HZ)?;
         }

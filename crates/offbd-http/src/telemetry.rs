@@ -8,10 +8,11 @@ use axum::{Extension, Json};
 use serde::Deserialize;
 
 use super::body::BodyShare;
-use super::{App, AssetPath, Problem, Query, body};
+use super::{App, AssetPath, Problem, Query, body, query_columns};
 use offbd_core::vocabulary::Invalid;
 use offbd_wire::problem::MEDIA_TYPE;
-use offbd_wire::telemetry::{AckView, RowsView, TelemetryFormat};
+use offbd_wire::table::TableOptions;
+use offbd_wire::telemetry::{AckView, RowsView, TelemetryFormat, csv};
 
 /// Returns the format in `Content-Type`; JSON without the header.
 fn format(headers: &HeaderMap) -> Result<TelemetryFormat, Problem> {
@@ -26,12 +27,16 @@ fn format(headers: &HeaderMap) -> Result<TelemetryFormat, Problem> {
 pub(super) struct SessionQuery {
     /// The device's session name, for formats without a field for it.
     session: Option<String>,
+    /// Which columns of CSV are which quantities, as of an import; by default `columns` of the asset
+    /// file, for a batch that has them all.
+    columns: Option<String>,
 }
 
 /// Ingests a batch of samples. The response is sent once the batch is durable.
 ///
 /// Formats: JSON rows as below; JSON columns (`{"t_s":[…],"x_m":[…],…}`); either document
-/// as MessagePack; NDJSON with one sample per line; CSV with the header of a session file.
+/// as MessagePack; NDJSON with one sample per line; CSV with the columns of a session file, or
+/// with those that `columns` or the asset file map.
 /// An invalid row is reported by its index; the valid rows are ingested. Within a session
 /// a sample is identified by `seq`, or by `t_s` if it has no `seq`. A sample that is sent
 /// again with the same values is counted as a duplicate and ignored, so that a batch can be
@@ -78,10 +83,30 @@ pub(super) async fn post(
     let limits = &app.service.limits().requests;
     let read = body::read(&headers, body, limits.batch_bytes, limits.body_timeout(), &share);
     let read = read.await?;
-    let mut batch = format.parse(&read.bytes, limits.batch_samples)?;
+    let mut batch = match format {
+        TelemetryFormat::Csv => {
+            let options = table_options(&app, &asset, query.columns.as_deref()).await?;
+            csv(&read.bytes, &options, limits.batch_samples)?
+        }
+        _ if query.columns.is_some() => {
+            return Err(Invalid::new("?columns", "applies to text/csv alone").into());
+        }
+        _ => format.parse(&read.bytes, limits.batch_samples)?,
+    };
     drop(read);
     batch.session = session_name(batch.session, query.session)?;
     Ok(Json(app.service.submit(&asset, batch)?.acknowledged().await?))
+}
+
+/// Returns how CSV of the asset is read.
+async fn table_options(
+    app: &App,
+    asset: &str,
+    columns: Option<&str>,
+) -> Result<TableOptions, Problem> {
+    let options = TableOptions { columns: query_columns(columns)?, ..TableOptions::default() };
+    let known = app.service.asset(asset).await?;
+    Ok(options.of_rig(known.columns.as_deref()))
 }
 
 /// Returns the session name in body or query; an error if both have one and they differ.

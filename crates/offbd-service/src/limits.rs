@@ -91,7 +91,7 @@ config_section! {
         /// Bytes of a batch; a longer one is answered with 413, and closes a WebSocket.
         batch_bytes: usize = 4 << 20, 1024..=1 << 30;
         /// Bytes of an imported file; a longer one is answered with 413.
-        import_bytes: usize = 64 << 20, 1024..=1 << 30;
+        import_bytes: usize = 128 << 20, 1024..=1 << 30;
         /// Bytes of all request bodies and messages in memory; then 429, and 1013 on a WebSocket.
         /// One token, or one address of another machine, has half of it. A body in zstd counts
         /// up to 8 MiB more while it arrives.

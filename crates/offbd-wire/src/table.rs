@@ -160,19 +160,20 @@ pub struct TableReader<'a> {
 }
 
 impl<'a> TableReader<'a> {
-    /// Opens a batch, whose columns have the names of the quantities and whose rows may be of any
-    /// time.
+    /// Opens a batch, whose rows may be of any time.
     ///
     /// # Errors
     /// [`CsvError`] if a column is missing or repeated, or `source` cannot be read.
-    pub fn batch(source: impl Read + Send + 'a) -> Result<Self, CsvError> {
-        Self::new(find_table(source)?, &TableOptions::default(), false)
+    pub fn batch(source: impl Read + Send + 'a, options: &TableOptions) -> Result<Self, CsvError> {
+        let table = find_table(source)?;
+        let options = &options.of_table(&table.dialect);
+        Self::new(table, options, false)
     }
 
-    /// The names of the columns that are not read.
+    /// The names of the columns that are not read; none where a mapping says which are.
     pub fn unread(&self) -> impl Iterator<Item = &str> {
         let read = self.mapping.columns();
-        let names = self.dialect.names.iter().enumerate();
+        let names = self.dialect.names.iter().enumerate().filter(|_| !self.mapping.is_given);
         names.filter(move |(i, _)| !read.contains(i)).map(|(_, name)| name.as_str())
     }
 

@@ -15,7 +15,7 @@ use utoipa::ToSchema;
 
 use self::cells::{BatchDocument, BatchRowSeed, UnknownKeys};
 pub use self::format::{TelemetryFormat, UnsupportedMediaType};
-use super::table::{TableReader, nearest_of};
+use super::table::{TableOptions, TableReader, nearest_of};
 use offbd_core::vocabulary::Sample;
 
 /// Largest `seq`: the largest integer of the store.
@@ -139,14 +139,14 @@ fn named(unknown: UnknownKeys) -> Vec<UnknownKeyView> {
     unknown.into_names().into_iter().map(view).collect()
 }
 
-/// Parses CSV with the header of a session file, with at most `limit` rows. Other columns are
-/// unknown keys.
+/// Parses CSV as `options` say, with at most `limit` rows. Unless they map columns, those without
+/// the name of a quantity are unknown keys.
 ///
 /// # Errors
-/// [`BatchError`] if the header is not that of a session file, or there are too many rows.
-pub fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
+/// [`BatchError`] if a column is missing, or there are too many rows.
+pub fn csv(document: &[u8], options: &TableOptions, limit: usize) -> Result<Batch, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
-    let reader = TableReader::batch(document).map_err(|e| malformed(e.to_string()))?;
+    let reader = TableReader::batch(document, options).map_err(|e| malformed(e.to_string()))?;
     let unknown = UnknownKeys::default();
     reader.unread().for_each(|name| unknown.note(name));
     let mut rows = Vec::new();

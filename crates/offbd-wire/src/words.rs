@@ -165,7 +165,7 @@ impl From<&Misfit> for MisfitWord {
             Misfit::NoCommands => Self::NoCommands,
             Misfit::NoAxis => Self::NoAxis,
             Misfit::Short { .. } => Self::Short,
-            Misfit::Rate { .. } => Self::Rate,
+            Misfit::Rate { .. } | Misfit::OtherRate { .. } => Self::Rate,
             Misfit::Positions { .. } => Self::Positions,
             Misfit::Commands { .. } => Self::Commands,
             Misfit::CommandsHeld => Self::CommandsHeld,

@@ -23,7 +23,7 @@ pub const PARSERS: [(&str, Parser); 15] = [
     ("json", |input| batch(telemetry::json(input, LIMIT))),
     ("msgpack", |input| batch(telemetry::msgpack(input, LIMIT))),
     ("ndjson", |input| batch(telemetry::ndjson(input, LIMIT))),
-    ("csv", |input| batch(telemetry::csv(input, LIMIT))),
+    ("csv", |input| batch(telemetry::csv(input, &TableOptions::default(), LIMIT))),
     ("session_file", session_file),
     ("calibration", calibration),
     ("asset", asset_file),
@@ -135,7 +135,10 @@ fn is_finite(sample: &Sample) -> bool {
 fn written_and_read(samples: &[Sample]) -> Vec<Sample> {
     let mut text = Vec::new();
     session_csv::write(&mut text, samples).unwrap();
-    TableReader::batch(text.as_slice()).unwrap().map(|row| row.unwrap()).collect()
+    TableReader::batch(text.as_slice(), &TableOptions::default())
+        .unwrap()
+        .map(|row| row.unwrap())
+        .collect()
 }
 
 /// Checks that the engine does not panic.
@@ -151,7 +154,7 @@ fn judge(samples: &[Sample]) {
 
 /// A recording from which a rig is calibrated.
 fn calibration(input: &[u8]) -> String {
-    let reader = match TableReader::batch(input) {
+    let reader = match TableReader::batch(input, &TableOptions::default()) {
         Ok(reader) => reader,
         Err(error) => return kind(&error.to_string()),
     };

@@ -360,7 +360,8 @@ impl Client {
 
 /// Parses a session file.
 pub fn read_csv(text: &str) -> Vec<Sample> {
-    let reader = offbd::wire::table::TableReader::batch(text.as_bytes()).unwrap();
+    let reader =
+        offbd::wire::table::TableReader::batch(text.as_bytes(), &Default::default()).unwrap();
     reader.map(Result::unwrap).collect()
 }
 

@@ -68,7 +68,7 @@ pub const JUDGEMENT: u32 = 5;
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
 /// fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 8;
+pub const SNAPSHOT_FORMAT: u32 = 9;
 
 /// The pipeline of one rig for one session (one operation cycle).
 ///

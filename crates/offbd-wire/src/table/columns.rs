@@ -111,6 +111,8 @@ pub(super) struct BoundMapping {
     /// In the order of [`COLUMNS`] without the time.
     pub(super) quantities: [Option<BoundColumns>; COLUMNS.len() - 1],
     pub(super) seq: Option<usize>,
+    /// Whether somebody has said which columns are read.
+    pub(super) is_given: bool,
 }
 
 /// Returns the mapping with the columns that have the name of a quantity, in any case, where
@@ -184,7 +186,8 @@ impl BoundMapping {
             (Some(columns), _) => time_source(dialect, columns),
             (None, rate) => TimeSource::Rows(1.0 / rate.unwrap_or(1.0)),
         };
-        Ok(Self { time, quantities, seq: find(dialect, "seq")? })
+        let is_given = !options.columns.is_empty();
+        Ok(Self { time, quantities, seq: find(dialect, "seq")?, is_given })
     }
 
     /// The columns that are read.

@@ -3,7 +3,7 @@ use crate::session_csv::write;
 use proptest::prelude::*;
 
 fn read(text: &str) -> Vec<Result<Sample, RowError>> {
-    TableReader::batch(text.as_bytes()).unwrap().collect()
+    TableReader::batch(text.as_bytes(), &TableOptions::default()).unwrap().collect()
 }
 
 #[test]
@@ -18,13 +18,15 @@ fn a_row_that_is_too_long_is_not_held_in_memory() {
     let start = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\n1,0,0,0,\"";
     for rest in ["0", "0\n"] {
         let rest = rest.as_bytes().repeat(8 << 20);
-        let mut reader = TableReader::batch(start.as_bytes().chain(&rest[..])).unwrap();
+        let mut reader =
+            TableReader::batch(start.as_bytes().chain(&rest[..]), &TableOptions::default())
+                .unwrap();
         assert!(reader.next().unwrap().is_ok());
         let error = reader.next().unwrap().unwrap_err();
         assert!(error.reason.contains("longer than 1 MiB"), "{error}");
         assert!(reader.next().is_none());
     }
-    let header = TableReader::batch(io::repeat(b'a'));
+    let header = TableReader::batch(io::repeat(b'a'), &TableOptions::default());
     assert!(matches!(header, Err(CsvError::NoTable)));
 }
 
@@ -48,12 +50,18 @@ fn an_invalid_row_is_reported_with_its_line_and_the_next_row_is_read() {
 
 #[test]
 fn a_header_with_a_missing_or_repeated_column_is_rejected() {
-    let error = TableReader::batch("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes()).err().unwrap();
+    let error = TableReader::batch("t_s,x_m,y_m,cmd_qx_rad\n".as_bytes(), &TableOptions::default())
+        .err()
+        .unwrap();
     assert!(error.to_string().contains("`cmd_qy_rad`"), "{error}");
-    let error =
-        TableReader::batch("t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes()).err().unwrap();
+    let error = TableReader::batch(
+        "t_s,t_s,x_m,y_m,cmd_qx_rad,cmd_qy_rad\n".as_bytes(),
+        &TableOptions::default(),
+    )
+    .err()
+    .unwrap();
     assert!(error.to_string().contains("twice"), "{error}");
-    assert!(TableReader::batch(&b""[..]).is_err());
+    assert!(TableReader::batch(&b""[..], &TableOptions::default()).is_err());
 }
 
 fn finite() -> impl Strategy<Value = f64> {
@@ -73,7 +81,7 @@ proptest! {
         }).collect();
         let mut text = Vec::new();
         write(&mut text, &samples).unwrap();
-        let back: Vec<Sample> = TableReader::batch(text.as_slice()).unwrap().map(Result::unwrap).collect();
+        let back: Vec<Sample> = TableReader::batch(text.as_slice(), &TableOptions::default()).unwrap().map(Result::unwrap).collect();
         prop_assert_eq!(back.len(), samples.len());
         for (a, b) in back.iter().zip(&samples) {
             prop_assert_eq!(format!("{:?}", a), format!("{:?}", b));
@@ -177,7 +185,7 @@ fn a_clock_that_starts_again_begins_a_run() {
     let late = format!("{head}0,0,0,0,0\n1,0,0,0,0\n2,0,0,0,0\n1.5,0,0,0,0\n");
     assert_eq!(times(&late, "", None), [(1, 0.0), (1, 1.0), (1, 2.0), (1, 1.5)]);
     let text = format!("{head}{run}{run}");
-    let mut batch = TableReader::batch(text.as_bytes()).unwrap();
+    let mut batch = TableReader::batch(text.as_bytes(), &TableOptions::default()).unwrap();
     assert_eq!(batch.by_ref().count(), 6);
     assert_eq!(batch.n_runs(), 1);
 }

@@ -1,6 +1,6 @@
 //! The formats in which a batch of telemetry comes.
 
-use super::{Batch, BatchError, csv, json, msgpack, ndjson};
+use super::{Batch, BatchError, TableOptions, csv, json, msgpack, ndjson};
 
 /// The format of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ impl TelemetryFormat {
         }
     }
 
-    /// Parses a batch of at most `limit` samples.
+    /// Parses a batch of at most `limit` samples, whose keys have the names of the quantities.
     ///
     /// # Errors
     /// [`BatchError`].
@@ -56,7 +56,7 @@ impl TelemetryFormat {
             Self::Json => json(document, limit),
             Self::Msgpack => msgpack(document, limit),
             Self::Ndjson => ndjson(document, limit),
-            Self::Csv => csv(document, limit),
+            Self::Csv => csv(document, &TableOptions::default(), limit),
         }
     }
 }

@@ -6,6 +6,10 @@ use offbd_core::vocabulary::any_sample;
 
 const LIMIT: usize = 100;
 
+fn csv(document: &[u8], limit: usize) -> Result<Batch, BatchError> {
+    TelemetryFormat::Csv.parse(document, limit)
+}
+
 fn reasons(batch: &Batch) -> Vec<(usize, &str)> {
     let reason = |(i, row): (usize, &'static Result<Sample, String>)| {
         row.as_ref().err().map(|reason| (i, reason.as_str()))

@@ -5,7 +5,7 @@ import type { FileInspection, FileReading } from "../../api/types";
 import { columnsParameter, mappingOf, type Mapping } from "./mapping";
 
 /** Largest file, bytes; also the default limit of the service. */
-const MAX_BYTES = 64 << 20;
+const MAX_BYTES = 128 << 20;
 
 /** A name for the rig of a file before one is chosen; it need not exist. */
 const ANY_RIG = "any";
@@ -22,7 +22,7 @@ export function useInspection(file: File, rig: string | undefined) {
   useEffect(() => {
     let isLatest = true;
     const found = async () => {
-      if (file.size > MAX_BYTES) throw new Error("The file is larger than 64 MiB. Split it.");
+      if (file.size > MAX_BYTES) throw new Error("The file is larger than 128 MiB. Split it.");
       return api.inspectRecording(rig ?? ANY_RIG, file, reading);
     };
     setBusy(true);

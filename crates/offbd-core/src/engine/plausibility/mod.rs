@@ -84,6 +84,16 @@ pub enum Misfit {
         per_second: Option<f64>,
     },
     #[error(
+        "a sample comes every {} s, but by the asset file's sample_rate_hz of {stated_hz} every {} s: \
+         are samples left out, or is sample_rate_hz {}?",
+        digits(*period_s), digits(stated_hz.recip()), digits(period_s.recip())
+    )]
+    OtherRate {
+        /// Median time between samples.
+        period_s: f64,
+        stated_hz: f64,
+    },
+    #[error(
         "{:.0} % of the positions lie outside the plate of the asset file{}",
         100.0 * share, unit_hint("axes.position_unit_m", units_m)
     )]
@@ -164,7 +174,7 @@ impl Misfit {
             Self::NoCommands => "no_commands",
             Self::NoAxis => "no_axis",
             Self::Short { .. } => "short",
-            Self::Rate { .. } => "rate",
+            Self::Rate { .. } | Self::OtherRate { .. } => "rate",
             Self::Positions { .. } => "positions",
             Self::Commands { .. } => "commands",
             Self::CommandsHeld => "commands_held",
@@ -182,6 +192,7 @@ impl Misfit {
         !matches!(
             self,
             Self::CommandsHeld
+                | Self::OtherRate { .. }
                 | Self::OneAxis { .. }
                 | Self::Swapped { .. }
                 | Self::WrongSign { .. }
@@ -422,7 +433,11 @@ impl Plausibility {
                 .flatten()
                 .collect();
         if found.is_empty() {
-            found.extend([self.short(), self.held(), self.one_axis()].into_iter().flatten());
+            found.extend(
+                [self.short(), self.held(), self.one_axis(), self.other_rate()]
+                    .into_iter()
+                    .flatten(),
+            );
             found.extend(self.answers());
             found.extend([self.scale(), self.no_room()].into_iter().flatten());
         }
@@ -437,6 +452,13 @@ impl Plausibility {
         };
         let per_second = [1e3, 1e6].into_iter().find(|&unit| fits(unit));
         (!fits(1.0)).then_some(Misfit::Rate { period_s, stated_hz, per_second })
+    }
+
+    /// A rate that differs by less than [`RATE_FACTOR`], with which everything can be judged.
+    fn other_rate(&self) -> Option<Misfit> {
+        let (period_s, stated_hz) = (self.periods.median_s(LEAST_COUNT)?, self.rig.sample_rate_hz);
+        let differs = (period_s * stated_hz).ln().abs() > SAME_RATE_FACTOR.ln();
+        differs.then_some(Misfit::OtherRate { period_s, stated_hz })
     }
 
     fn missing(&self) -> Option<Misfit> {
@@ -509,8 +531,7 @@ impl Plausibility {
     /// Positions that are too small by a power of ten: along each axis the ball responds to its own
     /// command that much less than it should.
     fn scale(&self) -> Option<Misfit> {
-        let rate = self.periods.median_s(LEAST_COUNT)? * self.rig.sample_rate_hz;
-        if rate.ln().abs() > SAME_RATE_FACTOR.ln() {
+        if self.other_rate().is_some() {
             return None;
         }
         let asked = self.rig.ball.rolling_gravity();

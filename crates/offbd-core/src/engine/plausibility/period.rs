@@ -28,11 +28,14 @@ pub(super) struct Periods {
     /// The classes that are not empty.
     classes: BTreeMap<u8, Class>,
     n: u32,
+    /// Samples older than the newest one.
+    n_late: u32,
 }
 
 impl Periods {
-    /// Takes the time since the newest sample; a sample that came late is ignored.
+    /// Takes the time since the newest sample.
     pub(super) fn take(&mut self, dt_s: f64) {
+        self.n_late = self.n_late.saturating_add((dt_s < 0.0).into());
         if dt_s > 0.0 && dt_s.is_finite() {
             let place = (dt_s.log10() - f64::from(FROM_DECADE)) * f64::from(PER_DECADE);
             let class = self.classes.entry((place as u8).min(LAST_CLASS)).or_default();
@@ -42,8 +45,8 @@ impl Periods {
         }
     }
 
-    /// Returns the mean of the class that holds the median; `None` for fewer than `least`
-    /// times.
+    /// Returns the mean of the class that holds the median, less the share of late samples, which
+    /// lie between the others; `None` for fewer than `least` times.
     pub(super) fn median_s(&self, least: u32) -> Option<f64> {
         if self.n < least {
             return None;
@@ -53,7 +56,8 @@ impl Periods {
             below = below.saturating_add(class.n);
             below > self.n / 2
         })?;
-        Some(class.sum_s / f64::from(class.n))
+        let in_order = f64::from(self.n) / f64::from(self.n.saturating_add(self.n_late));
+        Some(class.sum_s / f64::from(class.n) * in_order)
     }
 }
 
@@ -69,8 +73,18 @@ mod tests {
         }
         periods.take(-5.0);
         periods.take(f64::INFINITY);
-        assert!((periods.median_s(20).unwrap() - 0.01).abs() < 1e-12);
+        assert!((periods.median_s(20).unwrap() - 0.01 * 100.0 / 101.0).abs() < 1e-12);
         assert_eq!(periods.median_s(101), None);
+    }
+
+    #[test]
+    fn samples_out_of_order_do_not_change_it() {
+        let mut periods = Periods::default();
+        for _ in 0..50 {
+            periods.take(0.02);
+            periods.take(-0.01);
+        }
+        assert!((periods.median_s(20).unwrap() - 0.01).abs() < 1e-12);
     }
 
     #[test]

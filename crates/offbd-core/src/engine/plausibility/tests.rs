@@ -37,7 +37,10 @@ fn a_clock_in_milliseconds_is_named() {
 
 #[test]
 fn a_rate_that_is_off_by_more_than_three_is_named_without_a_guess() {
-    assert_eq!(misfits(&changed(|s| s.t_s *= 2.8)), []);
+    assert_eq!(misfits(&changed(|s| s.t_s *= 1.4)), []);
+    let words = "a sample comes every 0.028 s, but by the asset file's sample_rate_hz of 100 every \
+                 0.01 s: are samples left out, or is sample_rate_hz 35.7?";
+    assert_eq!(said(&changed(|s| s.t_s *= 2.8)), words);
     for factor in [4.0, 0.25] {
         let found = misfits(&changed(|s| s.t_s *= factor));
         assert!(matches!(found[..], [Misfit::Rate { per_second: None, .. }]), "{found:?}");
