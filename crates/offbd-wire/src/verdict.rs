@@ -347,7 +347,7 @@ struct NamedKind {
     code: FaultCode,
     kind: FaultKind,
     t_s: f64,
-    /// Its weight among the candidates.
+    /// Its largest weight among the candidates.
     weight: Option<f64>,
 }
 
@@ -401,15 +401,20 @@ impl Verdict {
             if *status == FaultStatus::Confirmed && !self.confirmed.contains(code) {
                 self.confirmed.push(*code);
             }
-            if let (FaultStatus::Confirmed, Some(kind)) = (status, suspicion.kind)
-                && !self.named.iter().any(|named| (named.code, named.kind) == (*code, kind))
-            {
-                let candidates = suspicion.candidates.iter().map(|each| (each.kind, each.weight));
-                let weight = kind_weight(Some(kind), candidates);
-                self.named.push(NamedKind { code: *code, kind, t_s: at.seconds(), weight });
+            if let (FaultStatus::Confirmed, Some(kind)) = (status, suspicion.kind) {
+                self.name(*code, kind, at.seconds(), suspicion.kind_weight());
             }
         } else if *status == FaultStatus::Cleared {
             self.suspected[*code as usize] = None;
+        }
+    }
+
+    /// Records the kind of a confirmed code. A kind that is named again is surer.
+    fn name(&mut self, code: FaultCode, kind: FaultKind, t_s: f64, weight: Option<f64>) {
+        match self.named.iter_mut().find(|named| (named.code, named.kind) == (code, kind)) {
+            Some(named) if weight > named.weight => named.weight = weight,
+            Some(_) => {}
+            None => self.named.push(NamedKind { code, kind, t_s, weight }),
         }
     }
 

@@ -96,6 +96,10 @@ pub struct Candidate {
     pub weight: f64,
 }
 
+/// Weight from which on a kind is stated as a fact. Chosen: at most one in five of these kinds
+/// is another one. The page has the same limit.
+pub const SURE_KIND: f64 = 0.8;
+
 /// A suspected fault: its onset, its kind and the causes that may explain it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Suspicion {
@@ -104,6 +108,26 @@ pub struct Suspicion {
     pub kind: Option<FaultKind>,
     /// Causes with the same symptoms, heaviest first; empty if there is only one.
     pub candidates: Vec<Candidate>,
+}
+
+impl Suspicion {
+    /// The weight of the kind among the candidates, 1 if there are none; `None` without a kind.
+    #[must_use]
+    pub fn kind_weight(&self) -> Option<f64> {
+        let kind = Some(self.kind?);
+        if self.candidates.is_empty() {
+            return Some(1.0);
+        }
+        self.candidates.iter().find(|each| each.kind == kind).map(|each| each.weight)
+    }
+
+    /// Whether the kind is a fact, and not only probable; never if another code may explain it.
+    #[must_use]
+    pub fn is_sure(&self) -> bool {
+        let codes = || self.candidates.iter().map(|each| each.code);
+        self.kind_weight().is_some_and(|weight| weight >= SURE_KIND)
+            && codes().all(|code| Some(code) == codes().next())
+    }
 }
 
 /// A change of one code's status byte.

@@ -211,14 +211,23 @@ impl FaultMemory {
         record.status != before
     }
 
-    /// Sets the kind of a confirmed fault if it showed only after the confirmation: takes
-    /// `suspicion` if it has a kind and the record has none. Returns whether it did.
+    /// Whether the kind of `code` may be set: its fault is confirmed and goes on, and its kind is
+    /// unknown or only probable.
+    #[must_use]
+    pub fn lacks_kind(&self, code: FaultCode) -> bool {
+        let record = self.record(code);
+        let goes_on = record.status.test_failed() && record.status.confirmed();
+        goes_on && !record.suspicion.as_ref().is_some_and(|known| known.is_sure())
+    }
+
+    /// Sets the kind of a confirmed fault whose kind showed only after the confirmation, or is
+    /// sure now: takes `suspicion`, if it has a kind, and the record has none or is less sure.
+    /// Returns whether it did.
     pub fn set_kind(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
-        let record = self.record_mut(code);
-        let named = record.kind().is_none() && suspicion.kind.is_some();
-        let named = named && record.status.test_failed() && record.status.confirmed();
+        let is_new = self.record(code).kind().is_none() && suspicion.kind.is_some();
+        let named = self.lacks_kind(code) && (is_new || suspicion.is_sure());
         if named {
-            record.suspicion = Some(Box::new(suspicion.clone()));
+            self.record_mut(code).suspicion = Some(Box::new(suspicion.clone()));
         }
         named
     }

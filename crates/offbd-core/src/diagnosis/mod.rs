@@ -23,7 +23,7 @@ pub use calibration::{
 };
 pub use debounce::{Debounce, DebounceTimes, Qualified, Test};
 pub use evaluator::{Evaluator, Finding, LearntLimit, Surroundings};
-pub use evidence::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+pub use evidence::{AxisEvidence, Candidate, Evidence, SURE_KIND, Suspicion, Transition};
 pub use limits::{Limits, SensorLimits};
 pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};
 pub use outlier::{GateOutcome, OutlierGate, PositionJump, UNKNOWN_NOISE_M};

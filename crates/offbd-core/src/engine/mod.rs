@@ -63,7 +63,7 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 5;
+pub const JUDGEMENT: u32 = 6;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the

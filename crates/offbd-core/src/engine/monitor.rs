@@ -184,7 +184,7 @@ impl Monitor {
         }
     }
 
-    /// Reports the kind of a fault that was confirmed before its kind was known.
+    /// Reports the kind of a fault that was confirmed before its kind was known, or sure.
     fn name(
         &self,
         code: FaultCode,
@@ -192,8 +192,12 @@ impl Monitor {
         memory: &mut FaultMemory,
         transitions: &mut Vec<Transition>,
     ) {
-        let unnamed = self.kind.is_some() && memory.record(code).kind().is_none();
-        if unnamed && memory.set_kind(code, &self.suspicion(code, evidence)) {
+        // What told the kind of a servo's fault before may tell none now.
+        let shows = |axis| evidence.axes[axis].answer.and_then(|answer| answer.kind()) == self.kind;
+        if self.kind.is_none() || !memory.lacks_kind(code) || !code.axis().is_none_or(shows) {
+            return;
+        }
+        if memory.set_kind(code, &self.suspicion(code, evidence)) {
             self.announce(code, evidence, memory, transitions);
         }
     }

@@ -74,6 +74,26 @@ fn healthy_rigs_are_silent() {
     }
 }
 
+/// An offset is not learnt as the level of the session: its test fails until the repair, which is
+/// not another fault.
+#[test]
+fn an_offset_fails_as_long_as_it_lasts() {
+    let setup = learnt(Preset::Chapter);
+    for seed in 1..4 {
+        let fault = "x_servo:offset@60-300";
+        let samples = session(Preset::Chapter, Reference::Lissajous, 420.0, seed, fault);
+        let found = transitions(&setup, &samples);
+        let of_servo = found.iter().filter(|t| t.code == FaultCode::XServo);
+        let changes: Vec<_> =
+            of_servo.map(|t| (t.at.seconds(), t.byte.test_failed(), t.status)).collect();
+        let repaired = changes.iter().position(|(t_s, ..)| *t_s > 300.0).unwrap();
+        let (during, after) = changes.split_at(repaired);
+        assert!(during[0].0 > 60.0 && during.iter().all(|(_, fails, _)| *fails), "{changes:?}");
+        assert_eq!(during.last().unwrap().2, FaultStatus::Confirmed, "{changes:?}");
+        assert!(after.iter().all(|(t_s, fails, _)| !fails && *t_s < 330.0), "{changes:?}");
+    }
+}
+
 /// A badly tuned controller makes the ball travel more, because it oscillates. That is not a fault
 /// of the rig, which obeys it, and none is found as long as the ball stays off the rim.
 #[test]

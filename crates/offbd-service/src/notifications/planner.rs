@@ -107,7 +107,7 @@ impl<T: NotificationTransport> Context<T> {
         Ok(rows.into_iter().map(|row| ((row.rule, row.asset, row.code), row.due_at)).collect())
     }
 
-    /// Returns the events that add the kind to one up to the position `before`, which has its
+    /// Returns the events that add a kind to one up to the position `before`, which has its
     /// message already.
     async fn updates(
         &self,
@@ -118,12 +118,17 @@ impl<T: NotificationTransport> Context<T> {
         for row in events {
             let named = ConfirmedFault::of(row).filter(|fault| fault.is_named);
             let (Some(named), Some(session)) = (named, &row.session) else { continue };
-            let (asset, code) = (&row.asset, named.code.as_str());
-            let earlier =
-                self.handles.store.transition_before(asset, session, code, row.id).await?;
-            let Some(earlier) = earlier.filter(|earlier| earlier.id <= before) else { continue };
-            if ConfirmedFault::of(&earlier).is_some_and(|unnamed| unnamed.is_named_by(&named)) {
-                updates.insert(row.id, earlier.id);
+            let (asset, code, mut at) = (&row.asset, named.code.as_str(), row.id);
+            while let Some(earlier) =
+                self.handles.store.transition_before(asset, session, code, at).await?
+                && ConfirmedFault::of(&earlier).is_some_and(|fault| fault.is_named_by(&named))
+            {
+                // Of several that wait for their message, the last one has it.
+                at = earlier.id;
+                if at <= before {
+                    updates.insert(row.id, at);
+                    break;
+                }
             }
         }
         Ok(updates)
@@ -196,17 +201,16 @@ impl ConfirmedFault {
         })
     }
 
-    /// Whether `later`, of the same asset, only adds the kind to it.
+    /// Whether `later`, of the same asset, only adds a kind to it, or is surer of its kind.
     fn is_named_by(&self, later: &Self) -> bool {
-        let is_same = self.code == later.code && self.identity == later.identity;
-        is_same && !self.is_named && later.is_named
+        self.code == later.code && self.identity == later.identity && later.is_named
     }
 }
 
-/// Returns whether one of the `later` events only adds the kind to the confirmed fault of `row`:
+/// Returns whether one of the `later` events only adds a kind to the confirmed fault of `row`:
 /// both are one message.
 fn is_named_later(row: &PlannedEventRow, later: &[PlannedEventRow]) -> bool {
-    let Some(fault) = ConfirmedFault::of(row).filter(|fault| !fault.is_named) else { return false };
+    let Some(fault) = ConfirmedFault::of(row) else { return false };
     later
         .iter()
         .filter(|next| next.asset == row.asset)

@@ -268,6 +268,15 @@ async fn a_kind_that_follows_soon_is_in_the_first_message_and_a_late_one_updates
     fixture.confirm(1, Some("dead")).await;
     let sent = fixture.pass(6 * SECOND, SECOND).await;
     assert_eq!(sent, attempts(&[(5, "updated.v1", "evt_2")]));
-    let last = fixture.inbox.attempts.lock().unwrap().pop().unwrap();
-    assert_eq!(last.1.data.updates.as_deref(), Some("evt_1"));
+    let updates = || {
+        let last = fixture.inbox.attempts.lock().unwrap().pop().unwrap();
+        last.1.data.updates
+    };
+    assert_eq!(updates().as_deref(), Some("evt_1"));
+    // Two more, of which the last one has the message.
+    fixture.confirm(2, Some("dead")).await;
+    fixture.confirm(3, Some("held")).await;
+    let sent = fixture.pass(8 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(6, "updated.v1", "evt_4")]));
+    assert_eq!(updates().as_deref(), Some("evt_2"));
 }

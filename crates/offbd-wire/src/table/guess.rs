@@ -165,7 +165,10 @@ const POSITIONS: [(&str, usize); 14] = [
     ("yball", 1),
 ];
 /// Positions of a beam, unless another word says the axis.
-const DISTANCES: [(&str, usize); 2] = [("position", 0), ("distance", 0)];
+const DISTANCES: [(&str, usize); 5] =
+    [("position", 0), ("distance", 0), ("pos", 0), ("dist", 0), ("abstand", 0)];
+/// Such positions if there is no other word: `ball seen` is none.
+const BALLS: [&str; 2] = ["ball", "kugel"];
 /// Words of quantities that are none of a sample.
 const OTHERS: [&str; 20] = [
     "dot", "xdot", "ydot", "v", "vx", "vy", "vel", "velocity", "acc", "ax", "ay", "err", "error",
@@ -261,6 +264,9 @@ fn meaning(name: &str) -> Option<Meaning> {
     }
     if let Some(axis) = axis(&POSITIONS).or_else(|| axis(&DISTANCES)) {
         return Some(Meaning::Position(axis));
+    }
+    if words.len() == 1 && has(&BALLS) {
+        return Some(Meaning::Position(0));
     }
     has(&TIMES).then_some(Meaning::Time)
 }
@@ -518,6 +524,14 @@ mod tests {
                 "t_s=#1/s, cmd_qx_rad=qx/rad, cmd_qy_rad=qy/rad, x_m='ball/position/x'/m, y_m='ball/position/y'/m",
             ),
             ("0,1,2\n1,2,3\n", ""),
+            (
+                "time,angle_deg,ball_mm\n0,1,3\n0.01,1,3\n",
+                "t_s=time/s, cmd_qy_rad=angle_deg/deg, x_m=ball_mm/mm",
+            ),
+            (
+                "time,qy,ball seen,pos\n0,0.1,1,0.1\n0.01,0.1,1,0.1\n",
+                "t_s=time/s, cmd_qy_rad=qy/rad, x_m=pos/m",
+            ),
             ("t_ms,px,py\n0,0.1,0.2\n10,0.1,0.2\n", "t_s=t_ms/ms, x_m=px/m, y_m=py/m"),
             ("t_ms,ball_x_px,adc_y,servo_raw\n0,320,200,512\n10,320,200,512\n", "t_s=t_ms/ms"),
         ] {

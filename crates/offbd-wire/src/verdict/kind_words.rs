@@ -1,16 +1,13 @@
 //! The kind of a fault in words, as a fact or as probable with its weight, and its status.
 
+use offbd_core::diagnosis::SURE_KIND;
 use offbd_core::vocabulary::FaultStatus;
 use std::fmt::Display;
-
-/// Weight from which on a kind is stated as a fact. Chosen: at most one in five of these kinds
-/// is another one. The page has the same limit.
-const SURE: f64 = 0.8;
 
 /// Whether a kind with this weight is only probable.
 #[must_use]
 pub fn is_probable(weight: f64) -> bool {
-    weight < SURE
+    weight < SURE_KIND
 }
 
 /// Returns a kind as a word for people: `dead`, or `probably dead, 51 %`.

@@ -106,7 +106,7 @@ pub struct NamedKindView {
     pub kind: KindWord,
     /// Time at which it was first named, s on the device's clock.
     pub t_s: f64,
-    /// Its weight among the candidates at that time, in (0, 1]; null if unknown.
+    /// Its largest weight among the candidates, in (0, 1]; null if unknown.
     pub weight: Option<f64>,
 }
 

@@ -147,6 +147,26 @@ fn a_kind_is_told_once_and_only_of_a_confirmed_failure() {
 }
 
 #[test]
+fn a_probable_kind_is_told_again_once_it_is_sure() {
+    let mut bench = Bench::new(1, true);
+    let of = |kind, weight| {
+        let each =
+            |kind, weight| crate::diagnosis::Candidate { code: CODE, kind: Some(kind), weight };
+        let candidates = vec![each(kind, weight), each(FaultKind::Offset, 1.0 - weight)];
+        Suspicion { kind: Some(kind), candidates, ..Suspicion::default() }
+    };
+    let (dead, held) = (FaultKind::Dead, FaultKind::Held);
+    bench.memory.failed(CODE, &of(dead, 0.6), &Evidence::default());
+    bench.failed();
+    bench.memory.trip(CODE, &of(dead, 0.6), &bench.rules);
+    assert!(!bench.memory.set_kind(CODE, &of(held, 0.75)), "not sure");
+    assert!(bench.memory.set_kind(CODE, &of(held, 0.8)));
+    assert!(!bench.memory.set_kind(CODE, &of(held, 0.95)), "told already");
+    assert!(!bench.memory.set_kind(CODE, &of(dead, 0.95)), "a fact stays");
+    assert_eq!(bench.memory.record(CODE).kind(), Some(held));
+}
+
+#[test]
 fn occurrences_remember_the_first_and_the_last_onset() {
     let mut bench = Bench::new(1, false);
     let at = |t_s: f64| Suspicion { onset: SimTime::new(t_s), ..Suspicion::default() };

@@ -9,8 +9,8 @@
 //! (Lorden 1971, Basseville & Nikiforov 1993, 2.2 and 5.2). Multiple models: Magill 1965;
 //! pushes as a rival explanation: Willsky & Jones 1976.
 //!
-//! The parameters of the second filter are the servo's effective offset, gain and delay,
-//! which tell the kind of fault. Both filters take the size of the noise as learnt; the
+//! The parameters of such a filter are the servo's effective offset, gain and delay. One that
+//! begins with the evidence ([`staying`]) tells the kind of fault. Both hypotheses take the size of the noise as learnt; the
 //! evidence of the [`path`] of the last two seconds does not depend on it. While the ball
 //! cannot respond (at rest within its breakaway angle, at the edge, unseen) nothing is
 //! compared.
@@ -21,6 +21,7 @@ mod estimate;
 mod filter;
 mod least_squares;
 mod path;
+mod staying;
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -34,6 +35,7 @@ use block::{BlockBuilder, ReadingBlock};
 use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
 use least_squares::LeastSquares;
 use path::PathEvidence;
+use staying::StayingFault;
 
 use super::calibration::MOST_MODEL_ERROR_M_S2;
 use crate::vocabulary::SimTime;
@@ -89,6 +91,10 @@ const STEADY_S: f64 = 20.0;
 /// Least standard deviation of a block's mean, m: roughness of plate and touch panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
 
+/// Evidence from which on the kind of fault is determined, nats. Chosen: well below what
+/// makes a servo suspected.
+const CLASSIFIED_NATS: f64 = 4.0;
+
 /// Allowance for the session's level, in standard errors. Chosen.
 const LEVEL_ERRORS: f64 = 2.0;
 
@@ -97,6 +103,11 @@ const LEVEL_ERRORS: f64 = 2.0;
 const GUST_M_S2: f64 = 0.03;
 /// Duration of a gust, s.
 const GUST_S: f64 = 2.0;
+
+/// Evidence from which on the healthy hypothesis does not learn its parameters, nats: otherwise it
+/// learns an offset as the level of the session, the test passes while the fault lasts, and its
+/// repair is a new fault. Chosen: well beyond the 13 that confirm a fault.
+const BROKEN_NATS: f64 = 20.0;
 
 /// Largest accumulated evidence, nats: limits how long it takes to fall after a servo has
 /// recovered. Chosen.
@@ -173,6 +184,8 @@ pub struct ServoFilterBank {
     last: Option<ReadingBlock>,
     healthy: ServoFilter,
     faulty: ServoFilter,
+    /// The servo since there is evidence for a fault; `None` without.
+    staying: Option<Box<StayingFault>>,
     /// Evidence for a fault, nats, in [0, [`MAX_NATS`]].
     nats: f64,
     /// When the evidence last was zero, s.
@@ -195,6 +208,7 @@ impl ServoFilterBank {
             last: None,
             healthy: ServoFilter::new(prior.parameters()),
             faulty: ServoFilter::new(FAULTY),
+            staying: None,
             nats: 0.0,
             rising_since: None,
             log_likelihood_nats: 0.0,
@@ -214,6 +228,9 @@ impl ServoFilterBank {
             let variance = self.prior.variance(block.n);
             self.healthy.anchor(block.deviation_m(), variance);
             self.faulty.anchor(block.deviation_m(), variance);
+            if let Some(staying) = &mut self.staying {
+                staying.anchor(block.deviation_m(), variance);
+            }
             return false;
         };
         self.weigh(&last, &block);
@@ -229,10 +246,12 @@ impl ServoFilterBank {
         let step = FilterStep { dt, forcing: forcing(last, block), density };
         let (y, variance) = (block.deviation_m(), self.prior.variance(block.n));
         self.path.take(block, variance, density, self.healthy.prior());
-        self.healthy.predict(&step);
-        self.faulty.predict(&step);
-        let faulty = self.faulty.correct(y, variance, dt);
-        let healthy = self.healthy.correct(y, variance, dt);
+        // A healthy servo is not learnt from a broken one.
+        let learns = self.nats < BROKEN_NATS;
+        self.healthy.predict(&step, learns);
+        self.faulty.predict(&step, true);
+        let faulty = self.faulty.correct(y, variance, dt, true);
+        let healthy = self.healthy.correct(y, variance, dt, learns);
         self.log_likelihood_nats += healthy;
         self.followed_s += dt;
         let share = dt / self.followed_s.min(STEADY_S);
@@ -245,6 +264,25 @@ impl ServoFilterBank {
             true => self.rising_since.or(Some(last.t)),
             false => None,
         };
+        self.stay(&step, y, variance);
+    }
+
+    /// Follows a servo that stays broken, from [`CLASSIFIED_NATS`] on until there is no evidence.
+    /// A repair ends the evidence of the path too.
+    fn stay(&mut self, step: &FilterStep, y: f64, variance: f64) {
+        match &mut self.staying {
+            Some(staying) if self.nats == 0.0 => {
+                if staying.was_broken() {
+                    self.path.exonerate();
+                }
+                self.staying = None;
+            }
+            Some(staying) => staying.follow(step, y, variance, self.nats >= BROKEN_NATS),
+            None if self.nats >= CLASSIFIED_NATS => {
+                self.staying = Some(Box::new(StayingFault::new(y, variance)));
+            }
+            None => {}
+        }
     }
 
     /// Stops following the ball, which cannot respond or was not seen. The estimates of
@@ -269,7 +307,7 @@ impl ServoFilterBank {
     pub fn exonerate(&mut self) {
         self.pause();
         self.path.exonerate();
-        self.faulty = ServoFilter::new(FAULTY);
+        (self.faulty, self.staying) = (ServoFilter::new(FAULTY), None);
         (self.nats, self.rising_since) = (0.0, None);
     }
 
@@ -285,6 +323,9 @@ impl ServoFilterBank {
         last.path.velocity_m_s -= velocity;
         self.healthy.shift(at_last, velocity);
         self.faulty.shift(at_last, velocity);
+        if let Some(staying) = &mut self.staying {
+            staying.shift(at_last, velocity);
+        }
     }
 
     /// Evidence for a fault, nats: the log-likelihood ratio of a broken to a healthy
@@ -336,10 +377,14 @@ impl ServoFilterBank {
         self.rising_since.and_then(SimTime::new)
     }
 
-    /// The recent response of the servo relative to the twin's.
+    /// The response of the servo relative to the twin's: since there is evidence for a fault, or
+    /// the recent one.
     #[must_use]
     pub fn answer(&self) -> ServoAnswer {
-        ServoAnswer::new(&self.faulty, self.nats)
+        match &self.staying {
+            Some(staying) => staying.answer(),
+            None => ServoAnswer::of(&self.faulty),
+        }
     }
 
     /// The response over the session; `None` if too little was seen.
