@@ -541,6 +541,24 @@ async fn the_asset_file_has_the_columns_of_its_files() {
     assert!(refused.to_string().contains("/columns"), "{refused}");
 }
 
+/// Names may be those of the quantities, in other units: what a node hands over from a bus is not
+/// converted again.
+#[tokio::test]
+async fn columns_apply_once_to_a_batch() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    let asset = json!({ "name": "a", "columns": "x_m=x_m/mm, y_m=y_m/mm" });
+    client.post("assets", &asset).await.expect(201);
+    let table = format!("{HEADER}\n0.0,0.0,0.0,40.0,10.0\n");
+    client.post_text("assets/a/telemetry?session=own", "text/csv", table.clone()).await.expect(200);
+    let request = client.request(reqwest::Method::POST, "assets/a/telemetry?session=bus");
+    let request = request.header("content-type", "text/csv").header("x-offbd-from-bus", "1");
+    client.send(request.body(table)).await.expect(200);
+    for (session, x_m) in [("own", 0.04), ("bus", 40.0)] {
+        assert_eq!(client.recording("a", session).await[0].x_m, Some(x_m), "{session}");
+    }
+}
+
 #[tokio::test]
 async fn unknown_keys_of_a_batch_are_named() {
     let fixture = ServiceFixture::start().await;

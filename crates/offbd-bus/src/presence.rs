@@ -24,8 +24,8 @@ const MAX_ATTENDANCE: usize = 100_000;
 /// a broker hands over those of some 40 000 devices at once after each connection.
 const MAX_UNCHECKED_BYTES: usize = 16 << 20;
 
-/// Bytes of a presence that waits, besides the name of its asset and its greeting. Chosen: more
-/// than a node of a map takes for one.
+/// Bytes that a waiting presence takes besides the name of its asset and its greeting. Chosen: more
+/// than an entry of the map of waiting presences.
 const UNCHECKED_OVERHEAD: usize = 256;
 
 /// Assets that one query checks. Chosen: their names take at most 32 KiB.
@@ -69,7 +69,7 @@ impl Attendance {
         Self { bus, shared: Arc::new(shared) }
     }
 
-    /// Takes a greeting or a presence, which counts once its asset is found.
+    /// Takes a greeting or a presence. It counts once its asset is found.
     pub(super) fn arrive(
         &self,
         service: &Service,

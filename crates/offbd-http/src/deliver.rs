@@ -53,7 +53,7 @@ fn request(
     // Writing to memory does not fail.
     let _ = session_csv::write(&mut document, samples);
     Request::post(format!("/api/v1/assets/{}/telemetry{query}", encoded(asset)))
-        // Nodes may have names, which are not permitted here without authentication.
+        // The name of a node is a host name that a service without authentication does not permit.
         .header(HOST, "localhost")
         .header(CONTENT_TYPE, "text/csv")
         .header(FROM_BUS, "1")

@@ -8,6 +8,7 @@ use axum::{Extension, Json};
 use serde::Deserialize;
 
 use super::body::BodyShare;
+use super::forward::is_from_bus;
 use super::{App, AssetPath, Problem, Query, body, query_columns};
 use offbd_core::vocabulary::Invalid;
 use offbd_wire::problem::MEDIA_TYPE;
@@ -84,6 +85,10 @@ pub(super) async fn post(
     let read = body::read(&headers, body, limits.batch_bytes, limits.body_timeout(), &share);
     let read = read.await?;
     let mut batch = match format {
+        // What another node took from a bus has the names of the quantities.
+        TelemetryFormat::Csv if is_from_bus(&headers) => {
+            format.parse(&read.bytes, limits.batch_samples)?
+        }
         TelemetryFormat::Csv => {
             let options = table_options(&app, &asset, query.columns.as_deref()).await?;
             csv(&read.bytes, &options, limits.batch_samples)?

@@ -18,7 +18,7 @@ const ROOT: [&str; 2] = ["offbd", "v1"];
 /// The level of offbd's own topic. No asset has it: `=` is in no name.
 const SERVICE_LEVEL: &str = "=service";
 
-/// Below it NATS clients receive the replies to their requests.
+/// The subject below which NATS clients receive the replies to their requests.
 pub const INBOX: &str = "_INBOX";
 
 /// Longest name of an asset, bytes, as in the asset file.

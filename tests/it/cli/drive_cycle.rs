@@ -38,5 +38,5 @@ fn a_missing_drive_cycle_is_explained() {
     tiny["plate"]["width_m"] = 0.03.into();
     cli.write("tiny.json", &tiny.to_string());
     let refused = cli.run(3, "drive-cycle --asset tiny.json").stderr;
-    assert!(refused.contains("/plate: it leaves the ball 0.0 mm along y"), "{refused}");
+    assert!(refused.contains("/plate: the ball has 0.0 mm to roll along y"), "{refused}");
 }

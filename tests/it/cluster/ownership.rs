@@ -144,7 +144,7 @@ async fn a_name_belongs_to_one_node_as_long_as_that_is_connected() {
     let server = Postgres::new();
     let url = server.database("cluster");
     let a = node(&url, "1", "a").await.unwrap();
-    // It has to be heard of now and then, or the server would take it for dead.
+    // The server ends a connection that has sent nothing for too long.
     let mut other = node(&url, "2", "other").await.unwrap();
     other.observe().await.unwrap();
     let (alive, refused) = (tokio::spawn(observe(a)), node(&url, "3", "a").await);

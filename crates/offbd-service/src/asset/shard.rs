@@ -30,7 +30,7 @@ enum Slot {
 /// An asset that is being loaded.
 #[derive(Default)]
 struct Loading {
-    /// The commands that wait for it.
+    /// The commands that wait until the asset is loaded.
     waiting: Vec<AssetCommand>,
     /// Why other commands are refused: it will take longer than a client should wait.
     refusal: Option<ServiceError>,

@@ -170,7 +170,7 @@ impl Import {
             }
         };
         let imported = match stop.run_until_cancelled(imported).await {
-            // The rows of a CSV file end also where it cannot be read on.
+            // The rows of a CSV file also end where it cannot be read any further.
             Some(imported) if !stop.is_cancelled() => imported,
             _ => Err(STOPPED),
         };
@@ -218,7 +218,7 @@ impl Import {
         Ok(())
     }
 
-    /// Returns a row of a file as one of a batch; an error if the file cannot be read on.
+    /// Returns a row of a file as one of a batch; an error if the file cannot be read any further.
     fn batch_row(
         &self,
         row: Result<Sample, SessionRowError>,

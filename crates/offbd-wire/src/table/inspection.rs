@@ -39,7 +39,7 @@ pub struct InspectedColumnView {
     pub name: Option<String>,
     /// The column as a mapping names it, in quotes if its name needs them.
     pub written: String,
-    /// What the line of units below the names says of it; null without such a line.
+    /// Its cell in the line of units below the names; null without such a line.
     pub unit: Option<String>,
     /// Its first cells.
     pub values: Vec<String>,

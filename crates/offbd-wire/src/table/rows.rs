@@ -239,8 +239,8 @@ impl<'a> Rows<'a> {
 }
 
 impl RowSource for Rows<'_> {
-    /// Reads the next row that is neither blank nor a comment. The rows are over where the source
-    /// cannot be read on.
+    /// Reads the next row that is neither blank nor a comment. The rows end where the source
+    /// cannot be read any further.
     fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
         while !self.is_over {
             self.line = self.last_line + 1;

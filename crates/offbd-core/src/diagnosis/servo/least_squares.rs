@@ -47,7 +47,7 @@ const LEAST_WINDOWS: u32 = 6;
 /// Standard deviations of the parameters before anything is known (m/s², 1, s). Offset and
 /// gain are those of a broken servo. The delay is that of a slow one: in slow circles
 /// friction looks like a delay of 0.1 to 0.2 s, which then distorts the gain. They hardly
-/// count for a parameter that the motion tells.
+/// count for a parameter that the motion determines.
 const UNKNOWN: [f64; PARAMETERS] = [0.3, 0.7, 0.05];
 
 /// Places of the upper triangle of a symmetric 3 × 3 matrix in its list of six.

@@ -10,10 +10,10 @@
 //! pushes as a rival explanation: Willsky & Jones 1976.
 //!
 //! The parameters of such a filter are the servo's effective offset, gain and delay. One that
-//! begins with the evidence ([`staying`]) tells the kind of fault. Both hypotheses take the size of the noise as learnt; the
-//! evidence of the [`path`] of the last two seconds does not depend on it. While the ball
-//! cannot respond (at rest within its breakaway angle, at the edge, unseen) nothing is
-//! compared.
+//! begins with the evidence ([`staying`]) tells the kind of fault. Both hypotheses take the size
+//! of the noise as learnt; the evidence of the [`path`] of the last two seconds does not depend
+//! on it. While the ball cannot respond (at rest within its breakaway angle, at the edge, unseen)
+//! nothing is compared.
 
 mod answer;
 mod block;

@@ -113,7 +113,7 @@ pub enum NoDriveCycle {
     )]
     NotLearnt,
     #[error(
-        "/plate: it leaves the ball {:.1} mm along {axis}, less than a motion takes",
+        "/plate: the ball has {:.1} mm to roll along {axis}, less than the motion needs",
         1e3 * room_m, axis = axis.as_str()
     )]
     NoRoom { axis: Axis, room_m: f64 },

@@ -102,7 +102,10 @@ fn a_rig_without_a_cycle_is_told_why() {
     assert!(why(Rig::chapter("a")).starts_with("/calibration: the rig is not calibrated"));
     assert!(why(learnt(None, None)).starts_with("/calibration: the rig is not calibrated"));
     let tiny = Rig { plate: plate(0.2, 0.03), ..good() };
-    assert_eq!(why(tiny), "/plate: it leaves the ball 0.0 mm along y, less than a motion takes");
+    assert_eq!(
+        why(tiny),
+        "/plate: the ball has 0.0 mm to roll along y, less than the motion needs"
+    );
     let sticky = AxisCalibration { breakaway_rad: 0.15, ..GOOD };
     assert!(why(learnt(Some(sticky), Some(GOOD))).starts_with("/servo/angle_limit_rad: "));
     let bad = Rig { sample_rate_hz: -1.0, ..good() };

@@ -65,7 +65,7 @@ pub enum JwtError {
     Claim(&'static str),
     #[error("no role of this service in the role claim")]
     Role,
-    #[error("the token of a device names no asset")]
+    #[error("the token has the role `device` and does not name an asset")]
     Asset,
 }
 
