@@ -54,7 +54,7 @@ use futures_util::future::try_join_all;
 use offbd::config::Config;
 use offbd::server::{self, Server};
 use offbd::wire::session_csv;
-use offbd::wire::table::TableReader;
+use offbd::wire::table::{TableOptions, TableReader};
 use offbd_core::diagnosis::FaultMemory;
 use offbd_core::engine::{Engine, Input, Rig, Setup};
 use offbd_core::vocabulary::Sample;
@@ -419,5 +419,5 @@ fn engine_alone(samples: &[Sample]) -> Result<Rate> {
 fn replay_csv(samples: &[Sample]) -> Result<Rate> {
     let mut file = Vec::new();
     session_csv::write(&mut file, samples)?;
-    judge(TableReader::batch(file.as_slice())?.map_while(Result::ok))
+    judge(TableReader::batch(file.as_slice(), &TableOptions::default())?.map_while(Result::ok))
 }
