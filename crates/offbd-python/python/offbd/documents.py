@@ -515,7 +515,7 @@ class NamedKind(TypedDict):
     """
     weight: NotRequired[float | None]
     """
-    Its weight among the candidates at that time, in (0, 1]; null if unknown.
+    Its largest weight among the candidates, in (0, 1]; null if unknown.
     """
 
 
