@@ -96,7 +96,7 @@ async fn an_endless_demo_clears_nothing_that_it_has_found() {
     let faults = "--fault x_servo:dead@10-30 --fault x_servo:dead@50";
     let (mut demo, said) = EndlessDemo::start(&cli, &format!("--speed 50 {faults}"));
     assert!(said.contains("stays on record until you clear it"), "{said}");
-    demo.until(") confirmed since");
+    demo.until(" confirmed since");
     demo.until(">> x_servo:dead injected");
     let history = demo.client.get("assets/demo-rig/faults/x_servo/history").await.expect(200);
     let entries = history["items"].as_array().unwrap();
