@@ -86,10 +86,7 @@ pub(super) async fn post(
     let read = read.await?;
     let mut batch = match format {
         // What another node took from a bus has the names of the quantities.
-        TelemetryFormat::Csv if is_from_bus(&headers) => {
-            format.parse(&read.bytes, limits.batch_samples)?
-        }
-        TelemetryFormat::Csv => {
+        TelemetryFormat::Csv if !is_from_bus(&headers) => {
             let options = table_options(&app, &asset, query.columns.as_deref()).await?;
             csv(&read.bytes, &options, limits.batch_samples)?
         }

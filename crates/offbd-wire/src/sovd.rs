@@ -338,7 +338,7 @@ fn fault_name(code: CodeWord, kind: Option<KindWord>, candidates: &[CandidateVie
         CodeWord::StuckBall => "stuck ball",
         CodeWord::Sensor => "position sensor",
     };
-    let weight = kind_weight(kind, candidates.iter().map(|each| (each.kind, each.weight)));
+    let weight = kind_weight(kind, candidates);
     match weight.filter(|&weight| is_probable(weight)) {
         Some(weight) => fault_title(name, kind, weight),
         None => name.to_owned(),

@@ -78,17 +78,14 @@ pub struct CandidateView {
     pub weight: f64,
 }
 
-/// Returns the weight of `kind` among candidates, given as kinds and weights: 1 if there are none.
-pub fn kind_weight<K: PartialEq>(
-    kind: Option<K>,
-    candidates: impl IntoIterator<Item = (Option<K>, f64)>,
-) -> Option<f64> {
-    let kind = Some(kind?);
-    let mut candidates = candidates.into_iter().peekable();
-    if candidates.peek().is_none() {
-        return Some(1.0);
+/// Returns the weight of `kind` among candidates: 1 if there are none.
+#[must_use]
+pub fn kind_weight(kind: Option<KindWord>, candidates: &[CandidateView]) -> Option<f64> {
+    kind?;
+    match candidates {
+        [] => Some(1.0),
+        _ => candidates.iter().find(|each| each.kind == kind).map(|each| each.weight),
     }
-    candidates.find(|(of, _)| *of == kind).map(|(_, weight)| weight)
 }
 
 /// The quantities of the diagnosis at one time.

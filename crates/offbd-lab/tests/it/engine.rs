@@ -5,7 +5,7 @@ mod real_world;
 
 use offbd_core::diagnosis::{FaultMemory, Profile, Transition};
 use offbd_core::engine::{Admission, Engine, Input, Rejection, Rig, Setup, calibrate};
-use offbd_core::vocabulary::{FaultCode, FaultStatus, Sample};
+use offbd_core::vocabulary::{FaultCode, FaultKind, FaultStatus, Sample};
 use offbd_lab::simulation::{Disturbances, Fault, PidGains, Preset, Reference, SimulatedRig};
 use proptest::prelude::*;
 
@@ -90,6 +90,9 @@ fn an_offset_fails_as_long_as_it_lasts() {
         let (during, after) = changes.split_at(repaired);
         assert!(during[0].0 > 60.0 && during.iter().all(|(_, fails, _)| *fails), "{changes:?}");
         assert_eq!(during.last().unwrap().2, FaultStatus::Confirmed, "{changes:?}");
+        // Its kind is a fact by then.
+        let known = &found.iter().rfind(|t| t.code == FaultCode::XServo).unwrap().suspicion;
+        assert!(known.kind == Some(FaultKind::Offset) && known.is_sure(), "{known:?}");
         assert!(after.iter().all(|(t_s, fails, _)| !fails && *t_s < 330.0), "{changes:?}");
     }
 }

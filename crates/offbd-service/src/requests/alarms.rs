@@ -196,10 +196,7 @@ impl Service {
             asset,
             code,
             kind: record.kind,
-            kind_weight: kind_weight(
-                record.kind,
-                record.candidates.iter().map(|each| (each.kind, each.weight)),
-            ),
+            kind_weight: kind_weight(record.kind, &record.candidates),
             status: record.status,
             failing: record.status_bits.test_failed,
             tested: !record.status_bits.test_not_completed_this_operation_cycle,

@@ -10,7 +10,6 @@ use offbd_wire::asset::AssetView;
 use offbd_wire::service::{FleetEntryView, FleetFaultView, Page, unjudged_view};
 use offbd_wire::stored::{StoredProvenance, StoredRecord};
 use offbd_wire::trend::TrendWarningView;
-use offbd_wire::verdict::kind_weight;
 
 /// Time without a sample after which a rig with an open session counts as silent.
 const SILENT_AFTER: Micros = 10_000_000;
@@ -138,11 +137,10 @@ fn fault(row: FaultRow) -> Result<FleetFaultView, ServiceError> {
     let stored: StoredRecord = views::from_json(&row.record)?;
     let provenance: StoredProvenance = views::from_json(&row.provenance)?;
     let record = stored.record().map_err(ServiceError::corrupt)?;
-    let candidates = record.suspicion.iter().flat_map(|suspicion| &suspicion.candidates);
     Ok(FleetFaultView {
         code: stored.code,
         kind: stored.kind,
-        kind_weight: kind_weight(record.kind(), candidates.map(|each| (each.kind, each.weight))),
+        kind_weight: record.suspicion.as_ref().and_then(|suspicion| suspicion.kind_weight()),
         status: views::word(&row.status)?,
         failing: record.status.test_failed(),
         tested: record.status.completed_this_cycle(),

@@ -167,7 +167,7 @@ const POSITIONS: [(&str, usize); 14] = [
 /// Positions of a beam, unless another word says the axis.
 const DISTANCES: [(&str, usize); 5] =
     [("position", 0), ("distance", 0), ("pos", 0), ("dist", 0), ("abstand", 0)];
-/// Such positions if there is no other word: `ball seen` is none.
+/// Such positions if the name has no other word: `ball seen` is not a position.
 const BALLS: [&str; 2] = ["ball", "kugel"];
 /// Words of quantities that are none of a sample.
 const OTHERS: [&str; 20] = [

@@ -1,6 +1,5 @@
 //! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
-use super::kind_weight;
 use super::kind_words::{fault_title, is_probable, status_words};
 use super::outcome::is_ambiguous;
 use crate::fault_kind::{Finding, answered_share, kind_text};
@@ -37,8 +36,7 @@ pub fn sentence(transition: &Transition) -> String {
 
 /// The weight of the kind; 1 if the candidates do not tell.
 fn weight(suspicion: &Suspicion) -> f64 {
-    let candidates = suspicion.candidates.iter().map(|c| (c.kind, c.weight));
-    kind_weight(suspicion.kind, candidates).unwrap_or(1.0)
+    suspicion.kind_weight().unwrap_or(1.0)
 }
 
 /// Describes what the evidence does not decide: candidates in different parts of the rig, or

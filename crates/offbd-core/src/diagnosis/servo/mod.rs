@@ -267,7 +267,7 @@ impl ServoFilterBank {
         self.stay(&step, y, variance);
     }
 
-    /// Follows a servo that stays broken, from [`CLASSIFIED_NATS`] on until there is no evidence.
+    /// Follows a broken servo while there is evidence, from [`CLASSIFIED_NATS`] on.
     /// A repair ends the evidence of the path too.
     fn stay(&mut self, step: &FilterStep, y: f64, variance: f64) {
         match &mut self.staying {

@@ -444,8 +444,13 @@ impl Plausibility {
         found
     }
 
+    /// The measured time between samples, s, and the stated rate.
+    fn rates(&self) -> Option<(f64, f64)> {
+        Some((self.periods.median_s(LEAST_COUNT)?, self.rig.sample_rate_hz))
+    }
+
     fn rate(&self) -> Option<Misfit> {
-        let (period_s, stated_hz) = (self.periods.median_s(LEAST_COUNT)?, self.rig.sample_rate_hz);
+        let (period_s, stated_hz) = self.rates()?;
         let fits = |per_second: f64| {
             let factor = period_s / per_second * stated_hz;
             (RATE_FACTOR.recip()..=RATE_FACTOR).contains(&factor)
@@ -456,7 +461,7 @@ impl Plausibility {
 
     /// A rate that differs by less than [`RATE_FACTOR`], with which everything can be judged.
     fn other_rate(&self) -> Option<Misfit> {
-        let (period_s, stated_hz) = (self.periods.median_s(LEAST_COUNT)?, self.rig.sample_rate_hz);
+        let (period_s, stated_hz) = self.rates()?;
         let differs = (period_s * stated_hz).ln().abs() > SAME_RATE_FACTOR.ln();
         differs.then_some(Misfit::OtherRate { period_s, stated_hz })
     }
