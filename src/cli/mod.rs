@@ -44,9 +44,9 @@ const SQLITE_THREAD: &str = "sqlx-sqlite-worker-";
     offbd demo --seconds 60\n\n\
     With files:\n  \
     offbd simulate --rig rig.json --reference lissajous -o healthy.csv\n  \
-    offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
+    offbd calibrate --asset rig.json healthy.csv -o calibrated.json\n  \
     offbd simulate --fault x_servo:dead@20 --seed 2 -o sick.csv\n  \
-    offbd replay --asset learnt.json healthy.csv sick.csv\n\n\
+    offbd replay --asset calibrated.json healthy.csv sick.csv\n\n\
     The book's exercises:\n  \
     offbd scene --list\n\n\
     Exit status: 0 success (faults or not), 2 invalid arguments, 3 unusable input,\n\

@@ -423,15 +423,15 @@ def recorded_session():
     """A calibrated rig, whose axes differ, and commands that were recorded at uneven intervals."""
     long = ["--reference", "lissajous", "--seconds", 90, "--seed", 7]
     offbd("simulate", "--rig", "of-owner.json", *long, "-o", "healthy.csv")
-    offbd("calibrate", "--asset", "of-owner.json", "healthy.csv", "-o", "learnt.json")
+    offbd("calibrate", "--asset", "of-owner.json", "healthy.csv", "-o", "calibrated.json")
     offbd("simulate", "--seconds", 10, "--seed", 3, "-o", "recorded.csv")
     # A row may lack the position, and the twin starts at the first one.
     names = ["t_s", "cmd_qx_rad", "cmd_qy_rad"]
     session = [[*row, 0.01, 0.02] for row in columns(DATA / "recorded.csv", *names)]
     assert len({round(b[0] - a[0], 6) for a, b in zip(session, session[1:])}) > 1
     write_session("recorded", session)
-    fmu = export("learnt.fmu", "--asset", "learnt.json")
-    wanted = free_run("recorded", 0.002, "learnt.json")
+    fmu = export("learnt.fmu", "--asset", "calibrated.json")
+    wanted = free_run("recorded", 0.002, "calibrated.json")
     difference = largest_difference(with_fmpy(fmu, session, 0.002), wanted)
     print(f"recorded: the FMU and the scene differ by at most {difference:.1e}")
     assert difference < 1e-12, difference

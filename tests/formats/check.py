@@ -45,7 +45,7 @@ def offbd(*arguments, status=0):
 
 
 def verdict_hash(file):
-    lines = offbd("replay", "--asset", "learnt.json", "--format", "json", file).stdout.splitlines()
+    lines = offbd("replay", "--asset", "calibrated.json", "--format", "json", file).stdout.splitlines()
     return json.loads(lines[-1])["verdict_hash"]
 
 
@@ -121,7 +121,7 @@ def check(what, found, expected):
 
 
 offbd("simulate", "--rig", "rig.json", "--reference", "lissajous", "--seconds", 90, "--seed", 7, "-o", "healthy.csv")
-offbd("calibrate", "--asset", "rig.json", "healthy.csv", "-o", "learnt.json")
+offbd("calibrate", "--asset", "rig.json", "healthy.csv", "-o", "calibrated.json")
 offbd("simulate", "--seed", 2, "--seconds", 40, "--fault", "x_servo:dead@20", "-o", "sick.csv")
 with open(DATA / "sick.csv", newline="") as file:
     rows = [{name: float(row[name]) if row[name] else None for name in COLUMNS} for row in DictReader(file)]
@@ -132,7 +132,7 @@ assert -1 in expected["x_m"], "no missing value"
 
 # What offbd writes is read by others.
 for suffix in ["parquet", "arrow"]:
-    offbd("export", "sick.csv", "--asset", "learnt.json", "-o", f"sick.{suffix}")
+    offbd("export", "sick.csv", "--asset", "calibrated.json", "-o", f"sick.{suffix}")
 parquet, arrow = DATA / "sick.parquet", DATA / "sick.arrow"
 table = pyarrow.parquet.read_table(parquet)
 check("Parquet in pyarrow", bits(table.to_pydict()), expected)
@@ -154,9 +154,9 @@ print("metadata: asset file, calibration and verdict hash")
 
 # The trace of the session is the same in each format, and as the service answers in JSON.
 for suffix in ["parquet", "arrow"]:
-    offbd("export", "sick.csv", "--asset", "learnt.json", "--trace", f"trace.{suffix}")
+    offbd("export", "sick.csv", "--asset", "calibrated.json", "--trace", f"trace.{suffix}")
 with service() as api:
-    session = api.imported(json.loads((DATA / "learnt.json").read_text()), (DATA / "sick.csv").read_bytes())
+    session = api.imported(json.loads((DATA / "calibrated.json").read_text()), (DATA / "sick.csv").read_bytes())
     document = json.loads(api.get(f"/sessions/{session}/trace?points=20000", "application/json"))
     for media_type, name in [("parquet", "served.parquet"), ("arrow.stream", "served.arrow")]:
         (DATA / name).write_bytes(api.get(f"/sessions/{session}/trace", f"application/vnd.apache.{media_type}"))
@@ -184,7 +184,7 @@ dated = csv.assign(t_s=csv.t_s + SINCE_1970_S)
 dated.to_csv(DATA / "dated.csv", index=False)
 dated_hash = verdict_hash("dated.csv")
 with service() as api:
-    asset = json.loads((DATA / "learnt.json").read_text()) | {"name": "dated"}
+    asset = json.loads((DATA / "calibrated.json").read_text()) | {"name": "dated"}
     session = api.imported(asset, (DATA / "dated.csv").read_bytes())
     opened_at = json.loads(api.get(f"/sessions/{session}", "application/json"))["opened_at"]
     for path, name in [("telemetry", "served"), ("trace", "served-trace")]:
@@ -193,7 +193,7 @@ with service() as api:
             (DATA / f"{name}-dated.{suffix}").write_bytes(file)
 offbd("export", "dated.csv", "-o", "dated.parquet")
 offbd("export", "dated.csv", "-o", "dated.arrow")
-offbd("export", "dated.csv", "--asset", "learnt.json", "--trace", "dated-trace.parquet")
+offbd("export", "dated.csv", "--asset", "calibrated.json", "--trace", "dated-trace.parquet")
 for name in ["served-dated", "served-trace-dated", "dated", "dated-trace"]:
     parquet, arrow = DATA / f"{name}.parquet", DATA / f"{name}.arrow"
     tables = {"Parquet": pyarrow.parquet.read_table(parquet)}
@@ -233,7 +233,7 @@ def described_type(schema):
     return message_factory.GetMessages(files.file)[schema.name]
 
 
-offbd("export", "sick.csv", "--asset", "learnt.json", "-o", "sick.mcap")
+offbd("export", "sick.csv", "--asset", "calibrated.json", "-o", "sick.mcap")
 messages = {}
 with open(DATA / "sick.mcap", "rb") as file:
     reader = mcap.reader.make_reader(file, validate_crcs=True)
@@ -266,7 +266,7 @@ samples = messages["/offbd/samples", "offbd.Sample"]
 check("MCAP in mcap", bits({name: [sample[name] for sample in samples] for name in COLUMNS}), expected)
 topics = {("/rig", "foxglove.SceneUpdate"), ("/twin", "foxglove.SceneUpdate"), ("/tf", "foxglove.FrameTransforms")}
 assert topics <= messages.keys(), messages.keys()
-lines = map(json.loads, offbd("replay", "--asset", "learnt.json", "--format", "json", "sick.csv").stdout.splitlines())
+lines = map(json.loads, offbd("replay", "--asset", "calibrated.json", "--format", "json", "sick.csv").stdout.splitlines())
 replayed = [line["summary"] for line in lines if "verdict_hash" not in line]
 check("the faults in the log", [log.message for log in messages["/faults", "foxglove.Log"]], replayed)
 assert replayed, "no fault"

@@ -478,6 +478,30 @@ async fn two_runs_in_one_log_are_two_sessions() {
     assert_eq!(sessions[0]["verdict"]["verdict_hash"], names[0][1]);
 }
 
+/// A batch may have two runs too; it does not name its session, and the device may have sent the
+/// first one before.
+#[tokio::test]
+async fn two_runs_in_one_batch_are_two_sessions() {
+    let cli = CliFixture::new();
+    let first = rows(&cli);
+    let second: Vec<_> =
+        first.iter().map(|&[t, qx, qy, x, y]| [t, qx, qy, x.map(|x| x + 1e-4), y]).collect();
+    let log = [&first, &second].map(|rows| table(HEADER, rows, ",", plain)).concat();
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    for (accepted, duplicate) in [(2 * first.len(), 0), (0, 2 * first.len())] {
+        let ack = client.post_text("assets/a/telemetry", "text/csv", log.clone()).await;
+        let ack = ack.expect(200);
+        let found = (&ack["accepted"], &ack["duplicate"], &ack["rejected"]);
+        assert_eq!(found, (&json!(accepted), &json!(duplicate), &json!([])));
+        let sessions = client.get("sessions?asset=a").await.expect(200);
+        let samples = |session: &Value| session["samples"].clone();
+        let samples: Vec<_> = sessions["items"].as_array().unwrap().iter().map(samples).collect();
+        assert_eq!(samples, vec![json!(first.len()); 2]);
+    }
+}
+
 #[tokio::test]
 async fn a_dry_run_says_how_a_file_would_be_read_and_imports_nothing() {
     let cli = CliFixture::new();

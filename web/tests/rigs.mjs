@@ -18,13 +18,13 @@ export function recordings(where) {
     "-o",
     path("healthy.csv"),
   );
-  offbd("calibrate", "--asset", path("rig.json"), path("healthy.csv"), "-o", path("learnt.json"));
+  offbd("calibrate", "--asset", path("rig.json"), path("healthy.csv"), "-o", path("calibrated.json"));
   offbd("simulate", "--seed", "2", "--seconds", "40", "--fault", "x_servo:dead@20", "-o", path("sick.csv"));
   const read = (name) => readFileSync(path(name), "utf8");
   return {
     path,
     rig: JSON.parse(read("rig.json")),
-    learnt: JSON.parse(read("learnt.json")),
+    learnt: JSON.parse(read("calibrated.json")),
     healthy: read("healthy.csv"),
     sick: read("sick.csv"),
   };

@@ -35,7 +35,7 @@ use offbd_wire::table::TableOptions;
     A moment in which the readings jump is left out and named; the first second counts \
     for nothing.\n\n\
     Examples:\n  \
-    offbd calibrate --asset rig.json healthy.csv -o learnt.json\n  \
+    offbd calibrate --asset rig.json healthy.csv -o calibrated.json\n  \
     offbd calibrate --asset rig.json monday.csv tuesday.csv -o - | jq .calibration\n\n\
     Exit status: 0 calibrated, 3 the data are not sufficient or a file is unusable."
 )]

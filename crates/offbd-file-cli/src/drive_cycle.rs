@@ -20,10 +20,10 @@ use offbd_wire::drive_cycle::{DriveCycleView, PYTHON, view, write_csv};
 /// example, at the start of a day, or if a verdict cannot tell causes apart.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    offbd drive-cycle --asset learnt.json\n  \
-    offbd drive-cycle --asset learnt.json --format json -o drive-cycle.json\n  \
-    offbd drive-cycle --asset learnt.json --format python -o drive-cycle.py\n  \
-    offbd replay --asset learnt.json drive-cycle-run.csv\n\n\
+    offbd drive-cycle --asset calibrated.json\n  \
+    offbd drive-cycle --asset calibrated.json --format json -o drive-cycle.json\n  \
+    offbd drive-cycle --asset calibrated.json --format python -o drive-cycle.py\n  \
+    offbd replay --asset calibrated.json drive-cycle-run.csv\n\n\
     Exit status: 0 done, 3 this rig has no drive cycle.")]
 pub struct DriveCycleArgs {
     /// The rig's asset file, calibrated

@@ -32,10 +32,10 @@ const BATCH: usize = 8192;
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(after_help = "Examples:\n  \
     offbd export monday.csv -o monday.parquet\n  \
-    offbd export monday.csv --asset learnt.json -o monday.mcap\n  \
+    offbd export monday.csv --asset calibrated.json -o monday.mcap\n  \
     offbd export monday.parquet --format arrow -o - | other-program\n  \
-    offbd export monday.csv --asset learnt.json --trace monday-trace.parquet\n  \
-    offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n\n\
+    offbd export monday.csv --asset calibrated.json --trace monday-trace.parquet\n  \
+    offbd export fmu --asset calibrated.json -o ball_on_plate.fmu\n\n\
     With an asset file the session is judged: asset file, calibration and verdict\n\
     hash are in the metadata of the new file (Parquet, Arrow, MCAP). An MCAP file\n\
     then also shows the rig, the twin and the faults in Foxglove.\n\n\

@@ -31,11 +31,11 @@ use offbd_terminal::table;
     MCAP files with messages of these keys; with `xlsx`, Excel workbooks. JSON lists \
     are read as texts are.\n\n\
     Examples:\n  \
-    offbd replay --asset learnt.json monday.csv tuesday.csv\n  \
-    offbd replay --asset learnt.json --join data-*.csv\n  \
+    offbd replay --asset calibrated.json monday.csv tuesday.csv\n  \
+    offbd replay --asset calibrated.json --join data-*.csv\n  \
     offbd replay --format json sick.csv | jq 'select(.status == \"confirmed\")'\n  \
     offbd replay --profile textbook sick.csv\n  \
-    offbd replay --asset learnt.json --against relearnt.json monday.csv\n\n\
+    offbd replay --asset calibrated.json --against recalibrated.json monday.csv\n\n\
     Invalid rows are reported on stderr with their line number, and counted.\n\n\
     Exit status: 0 all files judged (faults or not), 3 a file is unusable; the\n\
     others are judged; 4 a fault was confirmed, with --fail-on-fault."

@@ -26,8 +26,8 @@ use offbd_wire::trend::{TrendPointView, TrendView, TrendsView, estimate_view, tr
 /// warning.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
-    offbd trends --asset learnt.json monday.csv tuesday.csv wednesday.csv …\n  \
-    offbd trends --asset learnt.json --format json *.csv | jq '.trends[].warning'\n\n\
+    offbd trends --asset calibrated.json monday.csv tuesday.csv wednesday.csv …\n  \
+    offbd trends --asset calibrated.json --format json *.csv | jq .trends\n\n\
     Exit status: 0 judged (warnings or not), 3 a file could not be used.")]
 pub struct TrendsArgs {
     /// The rig's asset file, calibrated

@@ -30,13 +30,13 @@ def judged_by_program(asset: Path, session: Path, *more: str) -> list[dict[str, 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with rig.json, healthy.csv, learnt.json and sick.csv, all made by `offbd`."""
+    """A folder with rig.json, healthy.csv, calibrated.json and sick.csv, all made by `offbd`."""
     made = tmp_path_factory.mktemp("recordings")
     healthy, sick, rig = made / "healthy.csv", made / "sick.csv", made / "rig.json"
     simulate = ("simulate", "--reference", "lissajous", "--seconds", "60")
     run_program(*simulate, "--rig", rig, "-o", healthy)
     run_program("simulate", "--seed", "2", "--fault", "x_servo:dead@20", "-o", sick)
-    run_program("calibrate", "--asset", rig, healthy, "-o", made / "learnt.json")
+    run_program("calibrate", "--asset", rig, healthy, "-o", made / "calibrated.json")
     return made
 
 

@@ -122,7 +122,7 @@ def test_nothing_is_lost_or_doubled_by_a_lossy_line_and_a_kill(
     simulation = offbd.simulate(seed=2, faults=["x_servo:dead@20"], seconds=40, seq=True)
     samples = list(offbd.rows(simulation.table))
     client = offbd.Client(proxy.url)
-    asset = {**json.loads((folder / "learnt.json").read_text()), "name": "rig"}
+    asset = {**json.loads((folder / "calibrated.json").read_text()), "name": "rig"}
     client.put_asset("rig", asset)
     half = len(samples) // 2
     first = client.send("rig", samples[:half], session="s")
@@ -154,7 +154,7 @@ def test_an_imported_fault_is_an_alarm_until_somebody_clears_it(
     service: Service, folder: Path
 ) -> None:
     client = offbd.Client(service.url)
-    client.put_asset("rig", json.loads((folder / "learnt.json").read_text()))
+    client.put_asset("rig", json.loads((folder / "calibrated.json").read_text()))
     content = (folder / "sick.csv").read_bytes()
     imported = client.import_session("rig", content, name="monday & co")
     assert imported["session"]["name"] == "monday & co"
@@ -322,7 +322,7 @@ def test_a_rig_is_calibrated_from_its_sessions(service: Service, folder: Path) -
         client.put_asset("rig", json.loads((folder / "rig.json").read_text()))
         imported = client.import_session("rig", (folder / "healthy.csv").read_bytes())
         job = client.calibrate("rig", [imported["session"]["id"]], "Ada")
-        wanted = json.loads((folder / "learnt.json").read_text())["calibration"]
+        wanted = json.loads((folder / "calibrated.json").read_text())["calibration"]
         learnt = job.get("calibration")
         assert learnt is not None and learnt["x"] == wanted["x"]
         assert not job["active"]

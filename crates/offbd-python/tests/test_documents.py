@@ -62,7 +62,7 @@ def test_what_the_package_returns_has_its_types(folder: Path) -> None:
     healthy = offbd.simulate(reference="lissajous", seconds=60)
     check(healthy.asset, documents.Asset)
     check(offbd.calibrate(healthy.asset, healthy.table), documents.Asset)
-    verdict = offbd.replay(folder / "sick.csv", folder / "learnt.json")
+    verdict = offbd.replay(folder / "sick.csv", folder / "calibrated.json")
     assert verdict.faults
     check(verdict.faults, list[documents.Fault])
     check(verdict.summary, documents.Summary)
@@ -76,7 +76,7 @@ def test_what_the_package_returns_has_its_types(folder: Path) -> None:
 
 def test_what_the_client_returns_has_its_types(service: Service, folder: Path) -> None:
     with offbd.Client(service.url) as client:
-        learnt = json.loads((folder / "learnt.json").read_text())
+        learnt = json.loads((folder / "calibrated.json").read_text())
         check(client.put_asset("rig", learnt), documents.Asset)
         check(client.assets(), list[documents.Asset])
         healthy = client.import_session("rig", (folder / "healthy.csv").read_bytes())

@@ -70,9 +70,9 @@ def test_validate_the_verdict_against_the_program(
 ) -> None:
     session = folder / "sick.csv"
     more = ("--profile", profile) if profile else ()
-    lines = judged_by_program(folder / "learnt.json", session, *more)
+    lines = judged_by_program(folder / "calibrated.json", session, *more)
     recording = SOURCES[source](session)
-    verdict = offbd.replay(recording, folder / "learnt.json", profile=profile, session="sick.csv")
+    verdict = offbd.replay(recording, folder / "calibrated.json", profile=profile, session="sick.csv")
     assert verdict.faults == lines[:-1]
     assert verdict.summary == lines[-1]
     assert len(verdict.hash) == 64
@@ -105,7 +105,7 @@ def test_a_sample_that_is_sent_twice_counts_once() -> None:
 
 
 def test_an_engine_gives_the_verdict_of_a_replay(folder: Path) -> None:
-    asset = json.loads((folder / "learnt.json").read_text())
+    asset = json.loads((folder / "calibrated.json").read_text())
     frame = pl.read_csv(folder / "sick.csv")
     wanted = offbd.replay(frame, asset)
     engine = offbd.Engine(asset)
@@ -141,7 +141,7 @@ def without_date(learnt: Any) -> Any:
 
 def test_validate_the_calibration_against_the_program(folder: Path) -> None:
     learnt = offbd.calibrate(folder / "rig.json", [pd.read_csv(folder / "healthy.csv")])
-    wanted = json.loads((folder / "learnt.json").read_text())
+    wanted = json.loads((folder / "calibrated.json").read_text())
     assert without_date(learnt) == without_date(wanted)
 
 
@@ -168,7 +168,7 @@ def test_validate_a_scene_against_the_program(folder: Path) -> None:
 
 
 def test_tables_go_to_other_libraries(folder: Path) -> None:
-    verdict = offbd.replay(pd.read_csv(folder / "sick.csv"), folder / "learnt.json", evidence=True)
+    verdict = offbd.replay(pd.read_csv(folder / "sick.csv"), folder / "calibrated.json", evidence=True)
     assert verdict.evidence is not None
     wanted = verdict.evidence.to_pydict()
     assert len(wanted["t_s"]) == len(verdict.evidence) > 5000

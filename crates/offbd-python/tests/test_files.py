@@ -58,13 +58,13 @@ def converted(folder: Path, kind: str) -> Path:
 @pytest.mark.parametrize("kind", ["csv", "parquet", "arrow", "json"])
 def test_validate_the_verdict_of_a_file_against_the_program(folder: Path, kind: str) -> None:
     file = folder / "sick.csv" if kind == "csv" else converted(folder, kind)
-    lines = judged_by_program(folder / "learnt.json", file)
+    lines = judged_by_program(folder / "calibrated.json", file)
     for path in (file, str(file)):
-        verdict = offbd.replay(path, folder / "learnt.json")
+        verdict = offbd.replay(path, folder / "calibrated.json")
         assert (verdict.faults, verdict.summary) == (lines[:-1], lines[-1])
     assert verdict.summary["session"] == file.name
     assert offbd.replay(file, session="monday").summary["session"] == "monday"
-    engine = offbd.Engine(folder / "learnt.json")
+    engine = offbd.Engine(folder / "calibrated.json")
     assert engine.add(file) and engine.end().hash == verdict.hash
 
 
@@ -72,7 +72,7 @@ def test_a_mapping_of_columns_is_an_argument_or_part_of_the_asset(folder: Path) 
     file = with_other_columns(folder, "sick.csv")
     with pytest.raises(ValueError, match=f"{file.name}: .*lacks the column"):
         offbd.replay(file)
-    asset = folder / "learnt.json"
+    asset = folder / "calibrated.json"
     lines = judged_by_program(asset, file, "--columns", MAPPING)
     assert offbd.replay(file, asset, columns=MAPPING).summary == lines[-1]
     own = {**json.loads(asset.read_text()), "columns": MAPPING}
@@ -84,6 +84,70 @@ def test_a_mapping_of_columns_is_an_argument_or_part_of_the_asset(folder: Path) 
     assert len(table) == len(pd.read_csv(file, sep=";"))
     with pytest.raises(ValueError, match="rate_hz: expected a number"):
         offbd.replay(file, rate_hz=0.0)
+
+
+NAMES = ["t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m"]
+HEADER = ",".join(NAMES)
+OWN_NAMES = "Zeit,Roll,Pitch,X,Y"
+OWN = "t_s=Zeit, cmd_qx_rad=Roll, cmd_qy_rad=Pitch, x_m=X, y_m=Y"
+COUNTS = "t_s=#1/ms, cmd_qx_rad=#2*1e-5, cmd_qy_rad=#3*1e-5, x_m=#4*1e-6, y_m=#5*1e-6"
+
+
+def layouts(rows: list[dict[str, float | None]]) -> dict[str, tuple[bytes, str]]:
+    """The recording as many programs write it, each with the mapping that it needs."""
+
+    def lines(header: str, join: str = ",", missing: str = "", comma: str = ".") -> str:
+        def cell(value: float | None) -> str:
+            return missing if value is None else repr(value).replace(".", comma)
+
+        body = [join.join(cell(row[name]) for name in NAMES) for row in rows]
+        return "\n".join(([header] if header else []) + body) + "\n"
+
+    def labelled(row: dict[str, float | None]) -> str:
+        return " ".join(f"{name}:{'nan' if v is None else v}" for name, v in row.items())
+
+    def counted(row: dict[str, float | None]) -> str:
+        factors = zip(row.values(), (1e3, 1e5, 1e5, 1e6, 1e6), strict=True)
+        return ",".join("NA" if v is None else str(round(v * factor)) for v, factor in factors)
+
+    plain = lines(HEADER)
+    columns = {name: [row[name] for row in rows] for name in NAMES}
+    texts = {
+        "a spreadsheet": (lines(HEADER.replace(",", ";"), ";", comma=","), ""),
+        "missing as nan": (lines(HEADER, missing="nan"), ""),
+        "comments": ("% a log\n% of Monday\n\n" + plain.replace("\n0.5,", "\n% half\n0.5,"), ""),
+        "NumPy": ("# " + lines(HEADER.replace(",", " "), " ", "nan"), ""),
+        "separators at the end": (HEADER + lines("").join("\n\n").replace("\n", ",\n")[1:], ""),
+        "carriage returns": (plain.replace("\n", "\r"), ""),
+        "a header twice": (f"{HEADER}\n{plain}", ""),
+        "units": (f"{HEADER}\ns,rad,rad,m,m\n{lines('')}", ""),
+        "own names": (lines(OWN_NAMES), OWN),
+        "names before values": ("\n".join(map(labelled, rows)), ""),
+        "counts of a microcontroller": ("\n".join(map(counted, rows)), COUNTS),
+        "JSON rows": (json.dumps(rows), ""),
+        "JSON columns": (json.dumps(columns), ""),
+        "JSON lines": ("\n".join(map(json.dumps, rows)), ""),
+    }
+    files = {name: (text.encode(), mapping) for name, (text, mapping) in texts.items()}
+    files["UTF-16"] = (lines(HEADER.replace(",", "\t"), "\t").encode("utf-16"), "")
+    return files
+
+
+def test_validate_the_verdict_of_any_layout_against_the_program(folder: Path) -> None:
+    asset = folder / "calibrated.json"
+    plain = judged_by_program(asset, folder / "sick.csv")[-1]
+    (table,) = offbd.read(folder / "sick.csv")
+    n_rows = len(table)
+    for name, (content, mapping) in layouts(list(offbd.rows(table))).items():
+        file = folder / "layout.txt"
+        file.write_bytes(content)
+        more = ("--columns", mapping) if mapping else ()
+        summary = judged_by_program(asset, file, *more)[-1]
+        verdict = offbd.replay(file, asset, columns=mapping or None)
+        assert verdict.summary == summary and verdict.confirmed == ["x_servo"], name
+        assert (verdict.summary["accepted"], verdict.rejected) == (n_rows, []), name
+        if mapping != COUNTS:  # whose values are rounded
+            assert verdict.hash == plain["verdict_hash"], name
 
 
 def tables(file: Path) -> dict[str, Any]:
@@ -101,7 +165,7 @@ def tables(file: Path) -> dict[str, Any]:
 
 def test_a_table_has_a_mapping_as_a_file_has(folder: Path) -> None:
     file = with_other_columns(folder, "sick.csv")
-    asset = folder / "learnt.json"
+    asset = folder / "calibrated.json"
     own = {**json.loads(asset.read_text()), "columns": MAPPING}
     wanted = judged_by_program(asset, file, "--columns", MAPPING)[-1]
     for name, table in tables(file).items():
@@ -155,8 +219,8 @@ def test_the_runs_of_a_table_are_sessions(folder: Path) -> None:
 def test_a_text_without_a_time_has_a_rate(folder: Path) -> None:
     file = folder / "untimed.csv"
     pd.read_csv(folder / "sick.csv").drop(columns="t_s").to_csv(file, index=False)
-    lines = judged_by_program(folder / "learnt.json", file, "--rate", "200")
-    verdict = offbd.replay(file, folder / "learnt.json", rate_hz=200.0)
+    lines = judged_by_program(folder / "calibrated.json", file, "--rate", "200")
+    verdict = offbd.replay(file, folder / "calibrated.json", rate_hz=200.0)
     assert (verdict.faults, verdict.summary) == (lines[:-1], lines[-1])
 
 
@@ -175,7 +239,7 @@ def test_validate_the_calibration_of_a_file_against_the_program(
 
 def test_one_table_is_a_list_of_one(folder: Path) -> None:
     frame = pd.read_csv(folder / "healthy.csv")
-    wanted = without_date(json.loads((folder / "learnt.json").read_text()))
+    wanted = without_date(json.loads((folder / "calibrated.json").read_text()))
     for one in (frame, lists(folder / "healthy.csv"), pa.table(lists(folder / "healthy.csv"))):
         assert without_date(offbd.calibrate(folder / "rig.json", one)) == wanted
     again = offbd.calibrate(folder / "rig.json", (one for one in [frame]))

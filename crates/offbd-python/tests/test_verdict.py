@@ -22,7 +22,7 @@ matplotlib.use("agg")
 
 @pytest.fixture(scope="module")
 def verdict(folder: Path) -> offbd.Verdict:
-    return offbd.replay(folder / "sick.csv", folder / "learnt.json", evidence=True)
+    return offbd.replay(folder / "sick.csv", folder / "calibrated.json", evidence=True)
 
 
 def test_a_notebook_shows_a_verdict_as_a_table(verdict: offbd.Verdict) -> None:
@@ -45,10 +45,10 @@ def test_a_notebook_shows_a_verdict_as_a_table(verdict: offbd.Verdict) -> None:
 
 def test_what_a_notebook_shows_is_escaped_and_short(folder: Path) -> None:
     name = "<script>alert('&')</script>"
-    healthy = offbd.replay(folder / "healthy.csv", folder / "learnt.json", session=name)
+    healthy = offbd.replay(folder / "healthy.csv", folder / "calibrated.json", session=name)
     shown = ET.fromstring(healthy._repr_html_())
     assert shown.text is not None and f"{name}: no fault confirmed" in shown.text
-    sick = offbd.replay(folder / "sick.csv", folder / "learnt.json", session=name)
+    sick = offbd.replay(folder / "sick.csv", folder / "calibrated.json", session=name)
     odd = {**sick.faults[0], "summary": '"<b>', "kind": "<i>"}
     many = replace(sick, faults=[odd] * 30)  # type: ignore[list-item]
     rows = list(ET.fromstring(many._repr_html_()).iter("tr"))
@@ -120,7 +120,7 @@ def test_a_pickled_engine_goes_on_to_the_bit(folder: Path, share: float) -> None
     frame = pd.read_csv(folder / "sick.csv")
     frame.loc[5, "x_m"] = 1e9
     cut = int(share * len(frame))
-    engine = offbd.Engine(folder / "learnt.json", session="s")
+    engine = offbd.Engine(folder / "calibrated.json", session="s")
     engine.add(frame[:cut])
     copy: offbd.Engine = pickle.loads(pickle.dumps(engine))
     assert copy.summary() == engine.summary()

@@ -6,12 +6,12 @@ use super::fixture::CliFixture;
 fn a_calibration_is_near_the_true_parameters() {
     let cli = CliFixture::new();
     cli.ok("simulate --rig rig.json --reference lissajous --seconds 90 --seed 7 -o healthy.csv");
-    let done = cli.ok("calibrate --asset rig.json healthy.csv -o learnt.json");
+    let done = cli.ok("calibrate --asset rig.json healthy.csv -o calibrated.json");
     assert!(done.stderr.contains("gain") && done.stdout.is_empty());
     let table = done.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(table.contains("from 63 simulated rigs"), "{table}");
     assert!(table.contains("they are not measured on this rig"), "{table}");
-    let asset: Value = serde_json::from_str(&cli.read("learnt.json")).unwrap();
+    let asset: Value = serde_json::from_str(&cli.read("calibrated.json")).unwrap();
     let learnt = &asset["calibration"];
     // Parameters of the preset: gain 1 and 0.96, level 8 mrad and −5 mrad; play and drag make
     // the estimate of the gain less accurate.
@@ -101,11 +101,11 @@ fn implausible_units_are_rejected_with_a_suggestion() {
 fn a_wrong_unit_on_a_learnt_rig_is_not_a_dead_servo() {
     let cli = CliFixture::new();
     cli.ok("simulate --rig rig.json --reference lissajous --seconds 60 --seed 7 -o first.csv");
-    cli.ok("calibrate --asset rig.json first.csv -o learnt.json");
+    cli.ok("calibrate --asset rig.json first.csv -o calibrated.json");
     write_scaled(&cli, "small.csv", [1.0, 1.0, 1.0, 0.1, 0.1]);
-    let text = cli.ok("replay --asset learnt.json small.csv").stdout;
+    let text = cli.ok("replay --asset calibrated.json small.csv").stdout;
     assert!(text.contains("cannot tell a wrong unit from x_servo"), "{text}");
-    let json = cli.ok("replay --asset learnt.json --format json small.csv").stdout;
+    let json = cli.ok("replay --asset calibrated.json --format json small.csv").stdout;
     let summary: Value = serde_json::from_str(json.lines().last().unwrap()).unwrap();
     assert_eq!(summary["outcome"], "cannot tell", "{summary}");
     let warning = &summary["warnings"][0];

@@ -67,12 +67,12 @@ impl CliFixture {
         self.run(0, line)
     }
 
-    /// Writes the asset file of a calibrated rig to `learnt.json`.
+    /// Writes the asset file of a calibrated rig to `calibrated.json`.
     pub fn calibrated(&self) -> &Self {
         self.ok(
             "simulate --rig rig.json --reference lissajous --seconds 90 --seed 7 -o healthy.csv",
         );
-        self.ok("calibrate --asset rig.json healthy.csv -o learnt.json");
+        self.ok("calibrate --asset rig.json healthy.csv -o calibrated.json");
         self
     }
 }

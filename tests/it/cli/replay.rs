@@ -20,7 +20,7 @@ fn keys(object: &Value) -> Vec<&str> {
 fn json_lines_have_the_keys_of_the_contract() {
     let cli = CliFixture::new();
     cli.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
-    let lines = cli.ok("replay --asset learnt.json --format json sick.csv").json();
+    let lines = cli.ok("replay --asset calibrated.json --format json sick.csv").json();
     let (summary, faults) = lines.split_last().unwrap();
     for fault in faults {
         for key in [
@@ -58,7 +58,7 @@ fn the_output_does_not_depend_on_the_number_of_threads() {
     let cli = CliFixture::new();
     let names = sessions(cli.calibrated());
     let on = |jobs: u16| {
-        let line = format!("replay --asset learnt.json --format json --jobs {jobs} {names}");
+        let line = format!("replay --asset calibrated.json --format json --jobs {jobs} {names}");
         cli.ok(&line).stdout
     };
     let one = on(1);
@@ -79,7 +79,7 @@ fn late_and_duplicate_rows_do_not_change_the_verdict() {
     cli.calibrated().ok(&format!("{fault} -o plain.csv"));
     cli.ok(&format!("{fault} --late 0.2 --duplicates 0.2 --late-window-s 0.05 -o disturbed.csv"));
     assert_ne!(cli.read("plain.csv"), cli.read("disturbed.csv"));
-    let done = cli.ok("replay --asset learnt.json --format json plain.csv disturbed.csv");
+    let done = cli.ok("replay --asset calibrated.json --format json plain.csv disturbed.csv");
     let summaries = done.summaries();
     assert_eq!(summaries[0]["verdict_hash"], summaries[1]["verdict_hash"]);
     assert_eq!(summaries[0]["faults"], serde_json::json!(["y_servo"]));
@@ -178,7 +178,7 @@ fn an_unusable_file_does_not_prevent_judging_the_others() {
 fn the_table_of_verdicts_fits_in_eighty_columns() {
     let cli = CliFixture::new();
     let names = sessions(cli.calibrated());
-    let done = cli.ok(&format!("replay --asset learnt.json {names}"));
+    let done = cli.ok(&format!("replay --asset calibrated.json {names}"));
     assert!(done.stdout.lines().all(|line| line.chars().count() <= 80), "{}", done.stdout);
     assert!(done.stdout.contains("no fault"));
     assert!(done.stdout.contains("x_servo") && done.stdout.contains(" confirmed since "));
@@ -189,10 +189,11 @@ fn the_table_of_verdicts_fits_in_eighty_columns() {
 fn two_verdicts_are_compared_transition_by_transition() {
     let cli = CliFixture::new();
     cli.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
-    let mut asset: Value = serde_json::from_str(&cli.read("learnt.json")).unwrap();
+    let mut asset: Value = serde_json::from_str(&cli.read("calibrated.json")).unwrap();
     asset["diagnostics"] = serde_json::json!({ "debounce_s": 1.1 });
     cli.write("slow.json", &asset.to_string());
-    let same = cli.ok("replay --asset learnt.json --against learnt.json --format json sick.csv");
+    let same =
+        cli.ok("replay --asset calibrated.json --against calibrated.json --format json sick.csv");
     let lines = same.json();
     let (comparison, rest) = lines.split_last().unwrap();
     let differences: Vec<&Value> = rest.iter().filter(|l| l["type"] == "difference").collect();
@@ -201,7 +202,7 @@ fn two_verdicts_are_compared_transition_by_transition() {
     assert!(differences.iter().all(|l| l["change"] == "same" && l["moved_s"] == 0.0));
     assert_eq!((&comparison["type"], &comparison["same"]), (&"comparison".into(), &faults.into()));
     assert_eq!(comparison["verdict_hash"], comparison["against_hash"]);
-    let line = "replay --asset learnt.json --against slow.json";
+    let line = "replay --asset calibrated.json --against slow.json";
     let other = cli.ok(&format!("{line} --format json sick.csv")).json();
     let pending = other.iter().find(|l| l["type"] == "difference").unwrap();
     assert_eq!((&pending["change"], &pending["code"]), (&"moved".into(), &"x_servo".into()));
@@ -213,7 +214,7 @@ fn two_verdicts_are_compared_transition_by_transition() {
     let table = cli.ok(&format!("{line} sick.csv")).stdout;
     assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
     assert!(table.contains("moved") && table.contains("here, s"), "{table}");
-    let textbook = cli.ok("replay --asset learnt.json --against-profile textbook sick.csv");
+    let textbook = cli.ok("replay --asset calibrated.json --against-profile textbook sick.csv");
     assert!(textbook.stdout.contains("there only"), "{}", textbook.stdout);
 }
 
@@ -226,7 +227,7 @@ fn unwrapped(text: &str) -> String {
 fn verdicts_have_colours_only_where_they_are_wanted() {
     let cli = CliFixture::new();
     cli.calibrated().ok("simulate --seconds 30 --fault x_servo:dead@10 --seed 2 -o sick.csv");
-    let line = "replay --asset learnt.json sick.csv healthy.csv";
+    let line = "replay --asset calibrated.json sick.csv healthy.csv";
     let coloured = cli.with(&[("CLICOLOR_FORCE", "1")], line);
     for words in ["\u{1b}[31mx_servo (", "\u{1b}[32mno fault\u{1b}[0m"] {
         assert!(coloured.contains(words), "{coloured}");
@@ -241,15 +242,15 @@ fn unjudged_monitors_are_reported() {
     let cli = CliFixture::new();
     cli.calibrated().ok("simulate --seconds 0.3 -o short.csv");
     cli.ok("simulate --seconds 20 -o healthy.csv");
-    let short = cli.ok("replay --asset learnt.json short.csv").stdout;
+    let short = cli.ok("replay --asset calibrated.json short.csv").stdout;
     assert!(unwrapped(&short).contains(" 0.3 not judged judged x_servo "), "{short}");
     assert!(!short.contains("no fault"), "{short}");
     let unlearnt = cli.ok("replay healthy.csv").stdout;
     let words = "no fault of sensor; not calibrated: x_servo, y_servo, stuck_ball";
     assert!(unwrapped(&unlearnt).contains(words), "{unlearnt}");
-    let book = cli.ok("replay --asset learnt.json --profile textbook healthy.csv").stdout;
+    let book = cli.ok("replay --asset calibrated.json --profile textbook healthy.csv").stdout;
     assert!(unwrapped(&book).contains("; no test in this profile: stuck_ball, sensor"), "{book}");
-    let lines = cli.ok("replay --asset learnt.json --format json healthy.csv short.csv").json();
+    let lines = cli.ok("replay --asset calibrated.json --format json healthy.csv short.csv").json();
     let summaries: Vec<&Value> = lines.iter().filter(|l| l["type"] == "summary").collect();
     assert_eq!([&summaries[0]["outcome"], &summaries[1]["outcome"]], ["no fault", "not judged"]);
     for monitor in summaries[0]["monitors"].as_array().unwrap() {

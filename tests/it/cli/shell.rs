@@ -60,7 +60,7 @@ fn quiet_leaves_out_everything_but_results_and_errors() {
     let quiet = cli.ok("--quiet replay odd.csv");
     assert_eq!(quiet.stderr, "");
     assert_eq!(quiet.stdout, cli.ok("replay odd.csv").stdout);
-    assert_eq!(cli.ok("calibrate --asset rig.json healthy.csv -o learnt.json -q").stderr, "");
+    assert_eq!(cli.ok("calibrate --asset rig.json healthy.csv -o calibrated.json -q").stderr, "");
     assert_eq!(cli.ok("-q man -o pages").stderr, "");
     assert!(cli.run(3, "-q replay nowhere.csv").stderr.contains("nowhere.csv"));
 }
@@ -70,23 +70,23 @@ fn a_fault_can_be_told_by_the_exit_status() {
     let cli = CliFixture::new();
     cli.calibrated();
     cli.ok("simulate --asset rig.json --fault x_servo:dead@10 --seconds 20 -o sick.csv");
-    cli.ok("replay --asset learnt.json sick.csv");
-    let done = cli.run(4, "replay --asset learnt.json --fail-on-fault sick.csv healthy.csv");
+    cli.ok("replay --asset calibrated.json sick.csv");
+    let done = cli.run(4, "replay --asset calibrated.json --fail-on-fault sick.csv healthy.csv");
     assert!(done.stderr.contains("a fault was found in 1 of 2 sessions"), "{}", done.stderr);
     assert!(done.stdout.contains("x_servo"), "the verdict is printed all the same");
-    cli.ok("replay --asset learnt.json --fail-on-fault healthy.csv");
+    cli.ok("replay --asset calibrated.json --fail-on-fault healthy.csv");
     // A file that could not be judged might have had one as well.
-    cli.run(3, "replay --asset learnt.json --fail-on-fault sick.csv nowhere.csv");
+    cli.run(3, "replay --asset calibrated.json --fail-on-fault sick.csv nowhere.csv");
 }
 
 #[test]
 fn results_are_printed_as_json_on_request() {
     let cli = CliFixture::new();
     cli.ok("simulate --rig rig.json --reference lissajous --seconds 90 -o healthy.csv");
-    let learnt = cli.ok("calibrate --asset rig.json healthy.csv -o learnt.json --format json");
+    let learnt = cli.ok("calibrate --asset rig.json healthy.csv -o calibrated.json --format json");
     assert_eq!(learnt.stderr, "");
     let learnt = learnt.json().remove(0);
-    let file: serde_json::Value = serde_json::from_str(&cli.read("learnt.json")).unwrap();
+    let file: serde_json::Value = serde_json::from_str(&cli.read("calibrated.json")).unwrap();
     assert_eq!(learnt["calibration"], file["calibration"]);
     let both = cli.run(2, "calibrate --asset rig.json healthy.csv -o - --format json");
     assert!(both.stderr.contains("-o -"), "{}", both.stderr);

@@ -20,13 +20,13 @@ fn drifting_sessions() -> (CliFixture, String) {
 #[test]
 fn a_drift_causes_a_warning() {
     let (cli, names) = drifting_sessions();
-    let table = cli.ok(&format!("trends --asset learnt.json {names}")).stdout;
+    let table = cli.ok(&format!("trends --asset calibrated.json {names}")).stdout;
     assert!(table.lines().all(|line| line.chars().count() <= 80), "{table}");
     let last: Vec<&str> = table.lines().filter(|line| line.starts_with("warning: ")).collect();
     assert_eq!(last.len(), 1, "{table}");
     assert!(last[0].starts_with("warning: x_servo: its gain is "), "{table}");
 
-    let lines = cli.ok(&format!("trends --asset learnt.json --format json {names}")).json();
+    let lines = cli.ok(&format!("trends --asset calibrated.json --format json {names}")).json();
     let [view] = &lines[..] else { panic!("one object") };
     assert_eq!((view["points"].as_array().unwrap().len(), &view["asset"]), (10, &"chapter".into()));
     let summary = view["trends"][0]["warning"]["summary"].as_str().unwrap();
@@ -36,7 +36,7 @@ fn a_drift_causes_a_warning() {
 #[test]
 fn too_few_sessions_and_a_missing_calibration_are_reported() {
     let (cli, _) = drifting_sessions();
-    let few = cli.ok("trends --asset learnt.json s0.csv s1.csv").stdout;
+    let few = cli.ok("trends --asset calibrated.json s0.csv s1.csv").stdout;
     assert!(few.contains("6 sessions with enough motion make a trend; only 2 so far"), "{few}");
     let refused = cli.run(3, "trends --asset rig.json s0.csv").stderr;
     assert!(refused.contains("it has no calibration"), "{refused}");

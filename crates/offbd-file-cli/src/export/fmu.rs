@@ -21,7 +21,7 @@ use offbd_wire::fmu::{FmiVersion, FmuPlatform, archive};
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:\n  \
     cargo build --release --package offbd-fmu\n  \
-    offbd export fmu --asset learnt.json -o ball_on_plate.fmu\n  \
+    offbd export fmu --asset calibrated.json -o ball_on_plate.fmu\n  \
     offbd export fmu --fmi 2.0 -o ball_on_plate.fmu\n  \
     offbd export fmu --library liboffbd_fmu.so --library offbd_fmu.dll -o both.fmu\n\n\
     An FMU holds a shared library for each platform on which it runs. The library\n\

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::judge::JudgedSession;
 use offbd_terminal::table;
 use offbd_wire::difference::{ComparedTransition, ComparedView, TallyView, compare, count_changes};
-use offbd_wire::verdict::status_words;
+use offbd_wire::verdict::{FaultView, fault_title, kind_weight, status_words};
 
 /// A JSON line for a transition of either verdict.
 #[derive(Serialize)]
@@ -75,15 +75,17 @@ pub(super) fn write_table(
     let heading = ["", "fault", "status", "here, s", "there, s", "moved, s"];
     let mut rows = table::table(&heading, &[3, 4, 5]);
     for one in &all {
-        rows.add_row(cells(one));
+        let recorded = one.recorded.map(|i| &judged.faults[i]);
+        let replayed = one.replayed.map(|i| &against.faults[i]);
+        rows.add_row(cells(one, recorded.or(replayed)));
     }
     for line in table::lines(&rows) {
-        writeln!(out, "  {line}")?;
+        writeln!(out, "{line}")?;
     }
     Ok(())
 }
 
-fn cells(one: &ComparedTransition) -> [String; 6] {
+fn cells(one: &ComparedTransition, fault: Option<&FaultView>) -> [String; 6] {
     let view = &one.view;
     let time = |t_s: Option<f64>| t_s.map_or_else(String::new, |t_s| format!("{t_s:.2}"));
     let word = match view.change.as_str() {
@@ -91,11 +93,11 @@ fn cells(one: &ComparedTransition) -> [String; 6] {
         "only_replayed" => "there only",
         word => word,
     };
-    let kind = view.kind.as_ref().map_or_else(String::new, |kind| format!(" ({kind})"));
+    let weight = fault.and_then(|fault| kind_weight(fault.kind, &fault.candidates));
     let moved = view.moved_s.filter(|moved_s| *moved_s != 0.0);
     [
         word.to_owned(),
-        format!("{}{kind}", view.code),
+        fault_title(view.code, view.kind, weight.unwrap_or(1.0)),
         format!("{} {}", status_words(view.status.into()), view.status_byte),
         time(view.recorded_t_s),
         time(view.replayed_t_s),

@@ -32,7 +32,7 @@ use recorded::RecordedArgs;
     offbd scene sine --tolerance 1e-6\n  \
     offbd scene steep --model compliant --method rodas4 --tolerance 1e-9\n  \
     offbd scene my.json --model rolling --method rk4 --step 0.005 --format json\n  \
-    offbd scene --commands monday.csv --asset learnt.json -o out\n\n\
+    offbd scene --commands monday.csv --asset calibrated.json -o out\n\n\
     A scene file says what differs from the default rig (plate 0.38 × 0.24 m,\n\
     steel ball):\n  \
     { \"duration_s\": 2, \"contact\": { \"friction\": 0.3 },\n    \

@@ -82,16 +82,24 @@ impl EndedSession {
         open: Option<OpenSamples<'_>>,
         turn: &Turn<'_>,
     ) -> Result<Found, ServiceError> {
+        let doubtful = samples.iter().filter(|(_, sample)| self.is_doubtful(sample, open));
+        self.look_up(&doubtful.collect::<Vec<_>>(), turn)
+    }
+
+    /// Returns which of `samples` this session has, or has with other values. Blocks on the store.
+    pub(super) fn look_up(
+        &self,
+        samples: &[&(usize, Sample)],
+        turn: &Turn<'_>,
+    ) -> Result<Found, ServiceError> {
         let mut found = Found::default();
-        let doubtful: Vec<_> =
-            samples.iter().filter(|(_, sample)| self.is_doubtful(sample, open)).collect();
-        if doubtful.is_empty() {
+        if samples.is_empty() {
             return Ok(found);
         }
         turn.barrier()?;
         let recorded =
-            RecordedSamples::find(&self.id, doubtful.iter().map(|(_, sample)| sample), turn)?;
-        for (index, sample) in doubtful {
+            RecordedSamples::find(&self.id, samples.iter().map(|(_, sample)| sample), turn)?;
+        for (index, sample) in samples {
             match recorded.recognise(Recognition::Unknown, sample) {
                 Recognition::Same => drop(found.same.insert(*index)),
                 Recognition::Conflict => drop(found.conflicts.insert(*index)),

@@ -3,6 +3,7 @@
 use super::actor::Asset;
 use super::outcomes::{count_outcomes, count_unjudged};
 use super::recorded::RecordedSamples;
+use super::restart::first_run;
 use super::retransmission::retransmitted;
 use super::session::OpenSession;
 use super::sessions::SessionSwitch;
@@ -49,7 +50,14 @@ impl Asset {
                         }
                     }
                 },
-                None => self.record_nameless(samples, turn, &mut ack)?,
+                None => {
+                    let mut samples = samples;
+                    while !samples.is_empty() {
+                        let rest = samples.split_off(first_run(&samples));
+                        self.record_nameless(samples, turn, &mut ack)?;
+                        samples = rest;
+                    }
+                }
             }
         }
         if let Some(open) = &mut self.open {
@@ -150,10 +158,10 @@ impl Asset {
         };
         let (samples, rest) = samples.split_at(n_continued);
         self.record(samples, &mut recorded, turn, ack)?;
-        if rest.is_empty() {
+        if rest.is_empty() || self.is_earlier_run(rest, turn, ack)? {
             return Ok(());
         }
-        // Once per batch: a clock that jumps back and forth must not open many sessions.
+        // Once per run: a clock that jumps back and forth must not open many sessions.
         self.end(turn)?;
         self.open_nameless(turn)?;
         self.record_in_open(rest, turn, ack)

@@ -7,6 +7,7 @@ use super::turn::Turn;
 use crate::ServiceError;
 use offbd_core::engine::Recognition;
 use offbd_core::vocabulary::Sample;
+use offbd_store::Write;
 use offbd_wire::telemetry::{SampleKey, sample_key};
 
 /// Limit of the chunks of a recording that are searched for the samples of one batch. Chosen:
@@ -22,7 +23,7 @@ pub(super) struct RecordedSamples {
 }
 
 impl RecordedSamples {
-    /// Looks up `samples` in the recording of `session`.
+    /// Looks up `samples` in the recording of `session`, also in what this turn adds to it.
     pub(super) fn find<'a>(
         session: &str,
         samples: impl IntoIterator<Item = &'a Sample>,
@@ -38,6 +39,13 @@ impl RecordedSamples {
         let found = handles.wait(found)?;
         let mut this = Self { by_key: BTreeMap::new(), is_partial: found.is_none() };
         this.add(&found.unwrap_or_default());
+        for write in &turn.writes {
+            if let Write::Append { session: id, samples, .. } = write
+                && id == session
+            {
+                this.add(samples);
+            }
+        }
         Ok(this)
     }
 

@@ -45,6 +45,25 @@ impl Asset {
         Ok(samples)
     }
 
+    /// Whether an ended session has all of `samples`, which are then counted as duplicates: they are
+    /// not of another run, although the open session has other values for them.
+    pub(super) fn is_earlier_run(
+        &self,
+        samples: &[(usize, Sample)],
+        turn: &Turn<'_>,
+        ack: &mut AckView,
+    ) -> Result<bool, ServiceError> {
+        let samples: Vec<_> = samples.iter().collect();
+        for session in &self.ended {
+            let found = session.look_up(&samples, turn)?;
+            if found.same.len() == samples.len() {
+                session.acknowledge(&found, ack);
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     /// Returns `samples`, each with its index in the batch, without those that an earlier part
     /// of the open session has: with the same values, they are counted as duplicates; with
     /// others, they are rejected, as are those that parts may have that are not searched.

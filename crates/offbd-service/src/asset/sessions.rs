@@ -186,7 +186,14 @@ impl Asset {
         if self.has_sessions {
             turn.barrier()?;
             let (handles, asset) = (&turn.env.handles, &self.row.name);
-            while handles.wait(handles.store.session_named(asset, &rfc3339(at)))?.is_some() {
+            // This turn may have opened a session before, for an earlier run of the same batch.
+            let opened = |name: &str| {
+                let is_named = |w: &Write| matches!(w, Write::OpenSession(row) if row.name == name);
+                turn.writes.iter().any(is_named)
+            };
+            while opened(&rfc3339(at))
+                || handles.wait(handles.store.session_named(asset, &rfc3339(at)))?.is_some()
+            {
                 at += 1;
             }
         }

@@ -1,7 +1,7 @@
 """Runs the drive cycle of drive-cycle.json and records it in drive-cycle-run.csv.
 
 Put the ball near the middle of the plate, then start this program. To diagnose the recording:
-    offbd replay --asset learnt.json drive-cycle-run.csv
+    offbd replay --asset calibrated.json drive-cycle-run.csv
 """
 import json, time
 
