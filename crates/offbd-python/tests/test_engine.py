@@ -72,7 +72,8 @@ def test_validate_the_verdict_against_the_program(
     more = ("--profile", profile) if profile else ()
     lines = judged_by_program(folder / "calibrated.json", session, *more)
     recording = SOURCES[source](session)
-    verdict = offbd.replay(recording, folder / "calibrated.json", profile=profile, session="sick.csv")
+    asset = folder / "calibrated.json"
+    verdict = offbd.replay(recording, asset, profile=profile, session="sick.csv")
     assert verdict.faults == lines[:-1]
     assert verdict.summary == lines[-1]
     assert len(verdict.hash) == 64
@@ -168,7 +169,8 @@ def test_validate_a_scene_against_the_program(folder: Path) -> None:
 
 
 def test_tables_go_to_other_libraries(folder: Path) -> None:
-    verdict = offbd.replay(pd.read_csv(folder / "sick.csv"), folder / "calibrated.json", evidence=True)
+    frame = pd.read_csv(folder / "sick.csv")
+    verdict = offbd.replay(frame, folder / "calibrated.json", evidence=True)
     assert verdict.evidence is not None
     wanted = verdict.evidence.to_pydict()
     assert len(wanted["t_s"]) == len(verdict.evidence) > 5000

@@ -117,7 +117,7 @@ def layouts(rows: list[dict[str, float | None]]) -> dict[str, tuple[bytes, str]]
         "missing as nan": (lines(HEADER, missing="nan"), ""),
         "comments": ("% a log\n% of Monday\n\n" + plain.replace("\n0.5,", "\n% half\n0.5,"), ""),
         "NumPy": ("# " + lines(HEADER.replace(",", " "), " ", "nan"), ""),
-        "separators at the end": (HEADER + lines("").join("\n\n").replace("\n", ",\n")[1:], ""),
+        "separators at the end": (plain.replace("\n", ",\n").replace(",\n", "\n", 1), ""),
         "carriage returns": (plain.replace("\n", "\r"), ""),
         "a header twice": (f"{HEADER}\n{plain}", ""),
         "units": (f"{HEADER}\ns,rad,rad,m,m\n{lines('')}", ""),
@@ -145,7 +145,7 @@ def test_validate_the_verdict_of_any_layout_against_the_program(folder: Path) ->
         summary = judged_by_program(asset, file, *more)[-1]
         verdict = offbd.replay(file, asset, columns=mapping or None)
         assert verdict.summary == summary and verdict.confirmed == ["x_servo"], name
-        assert (verdict.summary["accepted"], verdict.rejected) == (n_rows, []), name
+        assert (verdict.summary["samples"], verdict.rejected) == (n_rows, []), name
         if mapping != COUNTS:  # whose values are rounded
             assert verdict.hash == plain["verdict_hash"], name
 
