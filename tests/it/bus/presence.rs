@@ -102,6 +102,8 @@ async fn are_taken_beside_telemetry(mosquitto: &Mosquitto) {
     metric(client, ONLINE, |n| n == before + RETAINED as f64).await;
     // One before the restart, one after it.
     assert_eq!(link.n_connections(), 2);
+    // It must not say of the next service that its connection is lost: the process has one metric.
+    fixture.server.take().unwrap().shutdown().await.unwrap();
 }
 
 /// Leaves a greeting and a presence of each device to the broker.
