@@ -36,6 +36,9 @@ for (const [what, address, link] of [
       .waitFor();
     await view.getByRole("heading", { name: "Calibration and certificate" }).waitFor();
     await view.locator(".report canvas").first().waitFor();
+    // On paper they are as large as on the screen.
+    const widths = await view.locator(".report .u-wrap").evaluateAll((all) => all.map((e) => e.clientWidth));
+    assert.equal(new Set(widths).size, 1, `as wide as each other: ${widths}`);
     await view
       .locator(".report-foot")
       .getByText(/offbd \d+\.\d+/)

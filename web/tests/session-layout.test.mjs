@@ -14,7 +14,15 @@ started(async (made) => {
 
 test("the ball, the controls of the playback and the residual are seen together", async () => {
   const session = await imported(service.url, "bench", "sick", rig.sick);
-  const viewport = { width: 1440, height: 900 };
+  for (const viewport of [
+    { width: 1440, height: 900 },
+    { width: 820, height: 1180 },
+  ]) {
+    await areSeenTogether(session, viewport);
+  }
+});
+
+async function areSeenTogether(session, viewport) {
   const view = await page(chromium, { viewport });
   await view.goto(`${service.url}/sessions/${session.id}`);
   const parts = [
@@ -31,4 +39,4 @@ test("the ball, the controls of the playback and the residual are seen together"
     );
   }
   await view.done();
-});
+}

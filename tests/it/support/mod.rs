@@ -31,6 +31,7 @@ pub mod web_socket;
 pub mod workbook;
 
 use std::future::Future;
+use std::panic::Location;
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
 use std::sync::OnceLock;
@@ -541,18 +542,24 @@ impl Events {
 
 /// Pause between two looks at what is to come. It leaves the processors to the service under test,
 /// and is short beside what a test does.
-const POLL_PAUSE: Duration = Duration::from_millis(2);
+const POLL_PAUSE: Duration = Duration::from_millis(10);
 
-/// Repeats `done` until it returns something; fails after [`DEADLINE`].
+/// Repeats `done` until it returns something; fails after [`DEADLINE`], and names the caller.
 #[expect(clippy::disallowed_methods, reason = "a test must not wait forever")]
-pub async fn eventually<T, F: Future<Output = Option<T>>>(mut done: impl FnMut() -> F) -> T {
-    let start = Instant::now();
-    loop {
-        if let Some(found) = done().await {
-            return found;
+#[track_caller]
+pub fn eventually<T, F: Future<Output = Option<T>>>(
+    mut done: impl FnMut() -> F,
+) -> impl Future<Output = T> {
+    let caller = Location::caller();
+    async move {
+        let start = Instant::now();
+        loop {
+            if let Some(found) = done().await {
+                return found;
+            }
+            assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline: {caller}");
+            tokio::time::sleep(POLL_PAUSE).await;
         }
-        assert!(start.elapsed() < DEADLINE, "not fulfilled within the deadline");
-        tokio::time::sleep(POLL_PAUSE).await;
     }
 }
 

@@ -9,15 +9,19 @@ interface Props {
   presence: Presence;
   /** Time at which the test last began to fail. */
   since?: string | null;
+  /** Whether something beside it says that no data arrive. */
+  isShort?: boolean;
 }
 
 /** A fault, its state, and since when. */
-export function FaultChip({ fault, presence, since }: Props) {
+export function FaultChip({ fault, presence, since, isShort = false }: Props) {
   const title = faultTitle(fault);
   const text = stateText(fault, presence, since ? sinceText(since) : undefined);
+  // Up to the comma it says what the test found, and when.
+  const shown = isShort ? text.split(",")[0] : text;
   return (
     <span class={chipClass(fault)} title={`${title}: ${text}`}>
-      <b>{faultTitle(fault, true)}</b> <span>{text}</span>
+      <b>{faultTitle(fault, true)}</b> <span>{shown}</span>
     </span>
   );
 }

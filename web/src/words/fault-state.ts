@@ -76,9 +76,9 @@ export function changeOf(line: Pick<FaultLine, "status" | "status_byte">): { tex
   return { text: statusWord(line.status), look: `status-${line.status}` };
 }
 
-/** What a test that passes again does not prove: a lasting offset becomes the level of its session. */
+/** What a test that passes again does not prove: a small offset that lasts becomes the level of its session. */
 export const repairNote = ({ kind }: Pick<FaultEntry, "kind">) =>
   kind === "offset"
-    ? "An offset that lasts a minute is taken for the level of the plate, so that its test passes without a repair: " +
+    ? "A small offset that lasts may be taken for the level of the plate, so that its test passes without a repair: " +
       "check the servo before you clear the fault."
     : "";

@@ -6,9 +6,7 @@ import { proposedSessions, totalLength, withChoice } from "../../src/pages/set-u
 import { falseAlarmRate } from "../../src/pages/set-up/false-alarm-rate.ts";
 import { isDone } from "../../src/pages/set-up/is-done.ts";
 import { learnFrom } from "../../src/pages/set-up/learn-from.ts";
-import { problemText } from "../../src/pages/set-up/problem-text.ts";
 import { snippets, unitsOf } from "../../src/pages/set-up/snippets.ts";
-import { ProblemError } from "../../src/api/request.ts";
 import { random } from "./random.mjs";
 
 test("a new rig is described as that of the book chapter", () => {
@@ -186,15 +184,4 @@ test("snippets name the units of the rig's description", () => {
     assert.match(text, /degrees/, language);
     assert.match(text, /\bmm\b/, language);
   }
-});
-
-test("a refused description names the field of the form, and values in its unit", () => {
-  const refused = (pointer, detail) => problemText(new ProblemError(422, { detail, pointer }));
-  const text = refused("/ball/radius_m", "/ball/radius_m: -0.003 is not above 0 and at most 1");
-  assert.equal(text, "Radius: −3\u202fmm is not above 0\u202fmm and at most 1000\u202fmm");
-  assert.equal(refused("/name", "/name: is taken"), "Name: is taken");
-  assert.equal(refused(undefined, "no element"), "no element");
-  const type = "urn:offbd:problem:asset-exists";
-  const detail = "asset `bench` already exists; replace it with PUT /api/v1/assets/bench";
-  assert.match(problemText(new ProblemError(409, { type, detail })), /^There is a rig of this name already/);
 });

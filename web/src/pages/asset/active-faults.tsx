@@ -3,7 +3,7 @@ import { FaultChip } from "../../parts/fault-chip";
 import { Link } from "../../router/link";
 import { faultPath } from "../../router/paths";
 import { faultMeaning } from "../../words/fault-names";
-import { stateOf, type Presence } from "../../words/fault-state";
+import { isPresent, stateOf, type Presence } from "../../words/fault-state";
 import { standing } from "../../words/severity";
 import { ambiguousCauses } from "../../words/verdict";
 
@@ -29,7 +29,10 @@ export function ActiveFaults({ asset, faults, presence }: Props) {
                 presence={presence}
                 since={last_occurrence?.noted_at}
               />{" "}
-              <span>{ambiguousCauses(candidates) || faultMeaning(fault, !state.failing)}</span>{" "}
+              <span>
+                {ambiguousCauses(candidates) ||
+                  faultMeaning(fault, !state.failing || !isPresent(state, presence))}
+              </span>{" "}
               <span class="more">Look at it →</span>
             </Link>
           </li>

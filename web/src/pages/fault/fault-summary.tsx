@@ -42,6 +42,7 @@ export function FaultSummary({ fault, history }: { fault: FaultEntry; history: H
       : `${capitalised(faultMeaning(fault, !isFailing(fault)))}.`;
     return (
       <div>
+        {!isFailing(fault) && failure && <p class="quiet small-text">At its last failure:</p>}
         <p class="sentence">{seen}</p>
         <p class={`present ${isFailing(fault) ? "status-confirmed" : "status-passed"}`}>
           {presentText(fault, history)}

@@ -8,7 +8,7 @@ import { alarmCodeTitle } from "../../words/alarm";
 import { NONE, number } from "../../words/numbers";
 import { severity } from "../../words/severity";
 import { dateTime, sinceText, timeAgo } from "../../words/time";
-import { isSilent, type FleetRow as Row } from "./rows";
+import { isSilent, presenceOfRow, type FleetRow as Row } from "./rows";
 
 /** Lag from which on it is highlighted, s. */
 const LATE_S = 2;
@@ -32,11 +32,16 @@ const COMMUNICATION = "communication_lost";
 /** The faults, the worst first. What failed when data stopped is not known to fail now. */
 function Faults({ entry }: { entry: Row["entry"] }) {
   const faults = [...entry.faults].sort((a, b) => severity(b) - severity(a));
-  const presence = entry.session_id == null ? "ended" : isSilent({ entry }) ? "silent" : "arriving";
+  const presence = presenceOfRow({ entry });
   return (
     <>
       {faults.map((fault) => (
-        <FaultChip fault={fault} presence={presence} since={fault.failed_at} />
+        <FaultChip
+          fault={fault}
+          presence={presence}
+          since={fault.failed_at}
+          isShort={entry.communication_lost_since != null}
+        />
       ))}
     </>
   );

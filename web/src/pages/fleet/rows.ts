@@ -1,6 +1,7 @@
 /** The rows of the list of rigs: filter, search and order. */
 import type { FleetEntry } from "../../api/types";
 import { codeTitle } from "../../words/fault-names";
+import type { Presence } from "../../words/fault-state";
 import { worstSeverity, type RigHealth } from "../../words/severity";
 import { healthOf } from "./fleet-state";
 
@@ -83,6 +84,10 @@ const COMPARE: Record<Sort, (a: FleetRow, b: FleetRow) => number> = {
 /** Whether no data arrive from a rig whose session is open. */
 export const isSilent = ({ entry }: Pick<FleetRow, "entry">) =>
   Boolean(entry.session_id && (entry.silent || entry.communication_lost_since));
+
+/** Whether data of a rig arrive. */
+export const presenceOfRow = (row: Pick<FleetRow, "entry">): Presence =>
+  row.entry.session_id == null ? "ended" : isSilent(row) ? "silent" : "arriving";
 
 /** A rig that fell silent while it failed is one of both. */
 const belongs = (row: FleetRow, filter: HealthFilter) =>

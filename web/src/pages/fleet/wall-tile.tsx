@@ -3,9 +3,10 @@ import { Link } from "../../router/link";
 import { rigPath } from "../../router/paths";
 import { driftText, driftTitle } from "../../words/drift";
 import { faultTitle } from "../../words/fault-names";
+import { stateText } from "../../words/fault-state";
 import { severity } from "../../words/severity";
 import { sinceText } from "../../words/time";
-import type { FleetRow } from "./rows";
+import { presenceOfRow, type FleetRow } from "./rows";
 
 /** The worst finding of a rig in a few words. */
 function worstFinding({ entry }: FleetRow): string {
@@ -17,8 +18,8 @@ function worstFinding({ entry }: FleetRow): string {
   if (silence) return silence;
   if (!worst && drift) return `${driftTitle(drift)}: ${driftText(drift)}`;
   if (!worst) return entry.unjudged?.reason ?? entry.session ?? "";
-  const since = worst.failing && worst.failed_at ? ` since ${sinceText(worst.failed_at)}` : "";
-  return faultTitle(worst, true) + since;
+  const since = worst.failed_at ? sinceText(worst.failed_at) : undefined;
+  return `${faultTitle(worst, true)} ${stateText(worst, presenceOfRow({ entry }), since)}`;
 }
 
 export function WallTile({ row }: { row: FleetRow }) {

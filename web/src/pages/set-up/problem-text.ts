@@ -15,7 +15,8 @@ const FIELDS: Record<string, { label: string; unit: string; factor: number }> = 
   "/servo/angle_limit_rad": { label: "Largest plate angle", unit: "°", factor: 180 / Math.PI },
 };
 
-const NUMBER = /-?\d+(?:\.\d+)?(?:e[+-]?\d+)?/gi;
+/** A number, and the unit of the asset file if the text has it. */
+const NUMBER = /(-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?: (?:m|kg|rad)\b)?/gi;
 
 const rounded = (n: number) => String(Number(n.toPrecision(4))).replace("-", "−");
 
@@ -29,7 +30,7 @@ export function problemText(error: unknown): string {
   if (field.factor === 1) return `${field.label}: ${reason}`;
   const inUnit = reason.replace(
     NUMBER,
-    (value) => `${rounded(Number(value) * field.factor)}\u202f${field.unit}`,
+    (_, value) => `${rounded(Number(value) * field.factor)}\u202f${field.unit}`,
   );
   return `${field.label}: ${inUnit}`;
 }

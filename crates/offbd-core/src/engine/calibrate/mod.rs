@@ -207,7 +207,8 @@ fn misfit(
 /// `reason`.
 fn with_cause(rig: &Rig, sessions: &[Vec<Sample>], reason: CannotCalibrate) -> CannotCalibrate {
     match reason {
-        CannotCalibrate::Unexplained { .. }
+        CannotCalibrate::NoAxis
+        | CannotCalibrate::Unexplained { .. }
         | CannotCalibrate::TooLittleExcitation { .. }
         | CannotCalibrate::TooShort { .. } => {
             misfit(rig, sessions, Misfit::hinders_learning).unwrap_or(reason)

@@ -18,6 +18,15 @@ fn changed(change: impl Fn(&mut Sample)) -> Vec<Sample> {
     samples
 }
 
+/// The ball of the asset file may be as large as the width of the plate: that of a beam may.
+#[test]
+fn a_ball_without_room_on_its_plate_is_named() {
+    let mut rig = Rig::chapter("a");
+    rig.ball = crate::plant::Ball::new(0.12, 0.051, 0.4).unwrap();
+    let refused = refused(&rig, &[session(60.0, 0.03, 1.0)]);
+    assert!(refused.contains("the ball, 0.12 m in radius, would touch the edge"), "{refused}");
+}
+
 #[test]
 fn what_cannot_be_of_the_rig_is_refused_with_its_session() {
     let rig = Rig::chapter("a");
