@@ -40,9 +40,11 @@ test("a low chart has four to seven numbers along its axis, whatever its values"
   for (let extent = 1e-4; extent < 1e4; extent *= 1.03) {
     for (const minimum of [-extent, -extent / 7, 0]) {
       const [low, high] = valueRange(minimum, extent, 0, minimum === 0);
-      const step = valueStep(low, high, 114);
-      const n = Math.floor(high / step) - Math.ceil(low / step) + 1;
-      assert.ok(n >= 4 && n <= 7, `${n} from ${low} to ${high}`);
+      for (const px of [92, 114]) {
+        const step = valueStep(low, high, px);
+        const n = Math.floor(high / step) - Math.ceil(low / step) + 1;
+        assert.ok(n >= 4 && n <= 7, `${n} from ${low} to ${high}`);
+      }
     }
   }
   assert.equal(valueStep(-0.116, 0.116, 114), 0.05);

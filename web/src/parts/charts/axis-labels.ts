@@ -16,19 +16,19 @@ export function digitsFor(step: number, digits: number): number {
 export const valueLabels = (values: (number | null)[], step: number, digits: number): string[] =>
   values.map((value) => (value === null ? "" : number(value, digitsFor(step, digits))));
 
-/** Fewest and most numbers along the axis of values. */
-const FEWEST_LABELS = 4;
+/** Most numbers along the axis of values, in a low chart and in any. */
+const MOST_LABELS_LOW = 5;
 const MOST_LABELS = 7;
 
 /** Least distance of two numbers, px, at the usual size of text: chosen for digits of 9 px. */
-const LABEL_PX = 16;
+const LABEL_PX = 13;
 
 /**
  * Returns the step between the numbers of an axis of `px` from `low` to `high`: the smallest round one with which they
  * are few enough. The next greater one is at most twice as large, so that they are not fewer than needed.
  */
 export function valueStep(low: number, high: number, px: number): number {
-  const most = Math.min(Math.max(Math.floor(px / LABEL_PX), FEWEST_LABELS), MOST_LABELS);
+  const most = Math.min(Math.max(Math.floor(px / LABEL_PX), MOST_LABELS_LOW), MOST_LABELS);
   const magnitude = Math.floor(Math.log10((high - low) / most));
   for (let exponent = magnitude; ; exponent++)
     for (const factor of [1, 2, 2.5, 5]) {
