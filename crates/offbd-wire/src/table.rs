@@ -20,6 +20,7 @@ mod rows;
 
 use std::io::{self, Cursor, Read};
 
+pub use self::clock::starts_again;
 pub use self::expression::{ColumnMapping, ColumnName, Expression, MappingError, Term};
 pub(crate) use self::guess::nearest_of;
 pub use self::inspection::{

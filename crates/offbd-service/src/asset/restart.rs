@@ -4,6 +4,7 @@ use super::recorded::RecordedSamples;
 use super::session::OpenSession;
 use offbd_core::engine::{Recognition, rejection};
 use offbd_core::vocabulary::Sample;
+use offbd_wire::table::starts_again;
 
 /// How far the clock must go back for samples that are not recorded yet to show a restart,
 /// s. Below it, they are late. Chosen.
@@ -13,26 +14,21 @@ const RESTART_S: f64 = 10.0;
 /// one may have a wrong time.
 pub(super) const CERTAIN_AFTER: u32 = 2;
 
-/// How near to the first time of a batch its clock must fall, and by how much at least, for the rest
-/// to be compared with what is recorded before it, s. Chosen: rows that a network delays are
-/// younger.
-const SPLIT_S: f64 = 1.0;
-
 /// Returns how many of the first `samples`, of which there is at least one, come before the clock or
 /// the numbers of the batch start again. The others may be of another run, which shows only once
 /// these are recorded.
 pub(super) fn first_run(samples: &[(usize, Sample)]) -> usize {
     let Some(((_, first), rest)) = samples.split_first() else { return 0 };
     let (mut latest_s, mut last_seq) = (first.t_s, first.seq);
-    let starts_again = |(_, sample): &(usize, Sample)| {
+    let is_restart = |(_, sample): &(usize, Sample)| {
         let again = match (first.seq, last_seq, sample.seq) {
             (Some(first), Some(last), Some(seq)) => seq <= first && seq < last,
-            _ => sample.t_s < latest_s - SPLIT_S && sample.t_s < first.t_s + SPLIT_S,
+            _ => starts_again(first.t_s, latest_s, sample.t_s),
         };
         (latest_s, last_seq) = (latest_s.max(sample.t_s), last_seq.max(sample.seq));
         again
     };
-    rest.iter().position(starts_again).map_or(samples.len(), |before| before + 1)
+    rest.iter().position(is_restart).map_or(samples.len(), |before| before + 1)
 }
 
 /// What one sample shows about a restart.

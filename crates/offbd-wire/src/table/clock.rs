@@ -16,6 +16,12 @@ const MOST_STEPS: f64 = 100.0;
 /// Chosen: rows that a network delays are younger.
 const RESTART_S: f64 = 1.0;
 
+/// Whether a clock that has gone from `first_s` to `last_s` starts again at `t_s`, all in s.
+#[must_use]
+pub fn starts_again(first_s: f64, last_s: f64, t_s: f64) -> bool {
+    t_s < last_s - RESTART_S && t_s < first_s + RESTART_S
+}
+
 /// The time of one row after the other.
 #[derive(Clone, Debug)]
 pub(super) struct RowClock {
@@ -94,8 +100,7 @@ impl RowClock {
         if !self.is_recording {
             return;
         }
-        let goes_on =
-            |(first, last): &(f64, f64)| t_s >= *last - RESTART_S || t_s >= *first + RESTART_S;
+        let goes_on = |(first, last): &(f64, f64)| !starts_again(*first, *last, t_s);
         match self.run.as_mut().filter(|run| goes_on(run)) {
             Some((_, last)) => *last = last.max(t_s),
             None => {
