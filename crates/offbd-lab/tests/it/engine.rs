@@ -97,6 +97,25 @@ fn an_offset_fails_as_long_as_it_lasts() {
     }
 }
 
+/// A servo passes its test again within a minute of motion after its repair, whenever in the session
+/// it broke: at first, the level of the session is hardly known.
+#[test]
+fn a_repaired_servo_passes_whenever_it_broke() {
+    let setup = learnt(Preset::Chapter);
+    for (seed, onset_s) in (1..).zip([0.0, 0.5, 2.0, 5.0, 20.0]) {
+        for kind in ["dead", "hold", "reversed", "slow", "offset"] {
+            let repair_s = onset_s + 15.0;
+            let fault = format!("y_servo:{kind}@{onset_s}-{repair_s}");
+            let samples = session(Preset::Chapter, Reference::Steps, repair_s + 60.0, seed, &fault);
+            let found = transitions(&setup, &samples);
+            let of_servo: Vec<_> = found.iter().filter(|t| t.code == FaultCode::YServo).collect();
+            let told = of_servo.iter().map(|t| (t.at.seconds(), t.byte)).collect::<Vec<_>>();
+            assert!(of_servo.iter().any(|t| t.byte.test_failed()), "{fault}: {told:?}");
+            assert!(!of_servo.last().unwrap().byte.test_failed(), "{fault}: {told:?}");
+        }
+    }
+}
+
 /// A badly tuned controller makes the ball travel more, because it oscillates. That is not a fault
 /// of the rig, which obeys it, and none is found as long as the ball stays off the rim.
 #[test]

@@ -34,6 +34,13 @@ pub(super) struct ParameterPrior {
     pub(super) memory_s: [f64; PARAMETERS],
 }
 
+/// Estimates of the parameters, with their covariance.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(super) struct ParameterEstimates {
+    values: [f64; PARAMETERS],
+    covariance: [[f64; PARAMETERS]; PARAMETERS],
+}
+
 /// The interval between two readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FilterStep {
@@ -108,13 +115,30 @@ impl ServoFilter {
         core::array::from_fn(|i| core::array::from_fn(|j| self.covariance[2 + i][2 + j]))
     }
 
-    /// Predicts the state over `step`; the parameters change only if the filter `learns`.
-    pub(super) fn predict(&mut self, step: &FilterStep, learns: bool) {
+    /// Estimates of all parameters.
+    pub(super) fn parameters(&self) -> ParameterEstimates {
+        let values = core::array::from_fn(|k| self.state[2 + k]);
+        ParameterEstimates { values, covariance: self.spread() }
+    }
+
+    /// Replaces the estimates of the parameters; those of the ball's motion are kept, and are
+    /// independent of the new ones.
+    pub(super) fn set_parameters(&mut self, parameters: &ParameterEstimates) {
+        for i in 0..2 {
+            for j in 2..STATES {
+                (self.covariance[i][j], self.covariance[j][i]) = (0.0, 0.0);
+            }
+        }
+        self.state[2..].copy_from_slice(&parameters.values);
+        for (row, known) in self.covariance[2..].iter_mut().zip(parameters.covariance) {
+            row[2..].copy_from_slice(&known);
+        }
+    }
+
+    /// Predicts the state over `step`.
+    pub(super) fn predict(&mut self, step: &FilterStep) {
         let FilterStep { dt, forcing, density } = *step;
-        let keep = self.prior.memory_s.map(|memory_s| match learns {
-            true => memory_s / (memory_s + dt),
-            false => 1.0,
-        });
+        let keep = self.prior.memory_s.map(|memory_s| memory_s / (memory_s + dt));
         let x = &mut self.state;
         let forced = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
             (0..PARAMETERS).map(|k| forcing[k][row] * of(2 + k)).sum()
@@ -160,11 +184,10 @@ impl ServoFilter {
         }
     }
 
-    /// The Kalman update of the first `n` states for an innovation of variance `s` whose
-    /// covariance with the state is `row`. The others are considered, not estimated
-    /// (Schmidt 1966); [`predict`](Self::predict) restores the symmetry.
-    fn update(&mut self, n: usize, row: &[f64; STATES], innovation: f64, s: f64) {
-        for i in 0..n {
+    /// The Kalman update for an innovation of variance `s` whose covariance with the
+    /// state is `row`.
+    fn update(&mut self, row: &[f64; STATES], innovation: f64, s: f64) {
+        for i in 0..STATES {
             let gain = row[i] / s;
             self.state[i] += gain * innovation;
             for (covariance, shared) in self.covariance[i].iter_mut().zip(row) {
@@ -173,10 +196,9 @@ impl ServoFilter {
         }
     }
 
-    /// Corrects with the deviation `y` of variance `variance`, `dt` after the last; the parameters
-    /// too, if the filter `learns`. Returns the log-likelihood of the reading, nats, up to a
-    /// constant.
-    pub(super) fn correct(&mut self, y: f64, variance: f64, dt: f64, learns: bool) -> f64 {
+    /// Corrects with the deviation `y` of variance `variance`, `dt` after the last.
+    /// Returns the log-likelihood of the reading, nats, up to a constant.
+    pub(super) fn correct(&mut self, y: f64, variance: f64, dt: f64) -> f64 {
         let p = &mut self.covariance;
         let innovation = y - self.state[0];
         let likelihood = |s: f64| -0.5 * (innovation * innovation / s + s.ln());
@@ -193,8 +215,7 @@ impl ServoFilter {
             p[1][1] += reach;
         }
         let row = p[0];
-        let n = if learns { STATES } else { 2 };
-        self.update(n, &row, innovation, row[0] + variance);
+        self.update(&row, innovation, row[0] + variance);
         plain.max(pushed)
     }
 }
@@ -217,8 +238,8 @@ mod tests {
             let ((p, v, a), (p1, v1, a1)) = (twin(t), twin(next));
             let forcing =
                 [[dt * dt / 2.0, dt], [p1 - p - v * dt, v1 - v], [-(v1 - v - a * dt), -(a1 - a)]];
-            filter.predict(&FilterStep { dt, forcing, density: 1e-9 }, true);
-            filter.correct(path(next), variance, dt, true);
+            filter.predict(&FilterStep { dt, forcing, density: 1e-9 });
+            filter.correct(path(next), variance, dt);
         }
         filter
     }

@@ -32,7 +32,7 @@ pub use estimate::ServoEstimate;
 use serde::{Deserialize, Serialize};
 
 use block::{BlockBuilder, ReadingBlock};
-use filter::{FilterStep, PARAMETERS, ParameterPrior, ServoFilter};
+use filter::{FilterStep, PARAMETERS, ParameterEstimates, ParameterPrior, ServoFilter};
 use least_squares::LeastSquares;
 use path::PathEvidence;
 use staying::StayingFault;
@@ -104,9 +104,12 @@ const GUST_M_S2: f64 = 0.03;
 /// Duration of a gust, s.
 const GUST_S: f64 = 2.0;
 
-/// Evidence from which on the healthy hypothesis does not learn its parameters, nats: otherwise it
-/// learns an offset as the level of the session, the test passes while the fault lasts, and its
-/// repair is a new fault. Chosen: well beyond the 13 that confirm a fault.
+/// Evidence from which on a servo is broken beyond doubt, nats. The healthy hypothesis then begins
+/// again with the parameters from before the fault, as it does whenever the evidence is at its
+/// largest: otherwise it learns an offset as the level of the session, the test passes while the
+/// fault lasts, and its repair is a new fault. It does not keep these parameters: those of a session
+/// that has just begun are hardly known, and a repaired servo would never seem healthy. Chosen: well
+/// beyond the 13 that confirm a fault.
 const BROKEN_NATS: f64 = 20.0;
 
 /// Largest accumulated evidence, nats: limits how long it takes to fall after a servo has
@@ -183,6 +186,8 @@ pub struct ServoFilterBank {
     builder: BlockBuilder,
     last: Option<ReadingBlock>,
     healthy: ServoFilter,
+    /// Parameters of the healthy servo when neither kind of evidence last spoke for a fault.
+    unaccused: ParameterEstimates,
     faulty: ServoFilter,
     /// The servo since there is evidence for a fault; `None` without.
     staying: Option<Box<StayingFault>>,
@@ -202,11 +207,13 @@ pub struct ServoFilterBank {
 impl ServoFilterBank {
     #[must_use]
     pub fn new(prior: AxisPrior) -> Self {
+        let healthy = ServoFilter::new(prior.parameters());
         Self {
             prior,
             builder: BlockBuilder::default(),
             last: None,
-            healthy: ServoFilter::new(prior.parameters()),
+            unaccused: healthy.parameters(),
+            healthy,
             faulty: ServoFilter::new(FAULTY),
             staying: None,
             nats: 0.0,
@@ -246,12 +253,10 @@ impl ServoFilterBank {
         let step = FilterStep { dt, forcing: forcing(last, block), density };
         let (y, variance) = (block.deviation_m(), self.prior.variance(block.n));
         self.path.take(block, variance, density, self.healthy.prior());
-        // A healthy servo is not learnt from a broken one.
-        let learns = self.nats < BROKEN_NATS;
-        self.healthy.predict(&step, learns);
-        self.faulty.predict(&step, true);
-        let faulty = self.faulty.correct(y, variance, dt, true);
-        let healthy = self.healthy.correct(y, variance, dt, learns);
+        self.healthy.predict(&step);
+        self.faulty.predict(&step);
+        let faulty = self.faulty.correct(y, variance, dt);
+        let healthy = self.healthy.correct(y, variance, dt);
         self.log_likelihood_nats += healthy;
         self.followed_s += dt;
         let share = dt / self.followed_s.min(STEADY_S);
@@ -259,11 +264,20 @@ impl ServoFilterBank {
         if self.followed_s < SETTLED_S {
             return;
         }
-        self.nats = (self.nats + faulty - healthy).clamp(0.0, MAX_NATS);
-        self.rising_since = match self.nats > 0.0 {
-            true => self.rising_since.or(Some(last.t)),
-            false => None,
-        };
+        let before = self.nats;
+        self.nats = (before + faulty - healthy).clamp(0.0, MAX_NATS);
+        if self.nats == 0.0 {
+            if self.path.nats().is_some_and(|nats| nats <= 0.0) {
+                self.unaccused = self.healthy.parameters();
+            }
+            self.rising_since = None;
+        } else {
+            self.rising_since = self.rising_since.or(Some(last.t));
+        }
+        let breaks = before < BROKEN_NATS && self.nats >= BROKEN_NATS;
+        if breaks || self.nats >= MAX_NATS {
+            self.healthy.set_parameters(&self.unaccused);
+        }
         self.stay(&step, y, variance);
     }
 

@@ -45,8 +45,8 @@ impl StayingFault {
     /// doubt, or not.
     pub(super) fn follow(&mut self, step: &FilterStep, y: f64, variance: f64, is_broken: bool) {
         self.was_broken |= is_broken;
-        self.filter.predict(step, true);
-        self.filter.correct(y, variance, step.dt, true);
+        self.filter.predict(step);
+        self.filter.correct(y, variance, step.dt);
         self.followed_s += step.dt;
         let share = step.dt / self.followed_s.min(MEAN_S);
         for (mean, now) in self.likelihoods.iter_mut().zip(likelihoods(&self.filter)) {
