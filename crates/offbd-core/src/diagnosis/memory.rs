@@ -211,25 +211,29 @@ impl FaultMemory {
         record.status != before
     }
 
-    /// Whether the kind of `code` may be set: its fault is confirmed and goes on, and its kind is
-    /// unknown or only probable.
+    /// Whether the kind of `code` may change: its fault is confirmed and goes on.
     #[must_use]
-    pub fn lacks_kind(&self, code: FaultCode) -> bool {
-        let record = self.record(code);
-        let goes_on = record.status.test_failed() && record.status.confirmed();
-        goes_on && !record.suspicion.as_ref().is_some_and(|known| known.is_sure())
+    pub const fn goes_on(&self, code: FaultCode) -> bool {
+        let status = self.record(code).status;
+        status.test_failed() && status.confirmed()
     }
 
-    /// Sets the kind of a confirmed fault whose kind showed only after the confirmation, or is
-    /// sure now: takes `suspicion`, if it has a kind, and the record has none or is less sure.
-    /// Returns whether it did.
-    pub fn set_kind(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
-        let is_new = self.record(code).kind().is_none() && suspicion.kind.is_some();
-        let named = self.lacks_kind(code) && (is_new || suspicion.is_sure());
-        if named {
-            self.record_mut(code).suspicion = Some(Box::new(suspicion.clone()));
+    /// Takes the `suspicion` of a confirmed fault that goes on. Another kind replaces one that is
+    /// unknown or only probable, and a sure kind replaces any other. As long as the kind is not
+    /// sure, the weights of the candidates are the present ones. Returns whether the record has
+    /// another kind, or is sure of it now.
+    pub fn revise(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
+        let goes_on = self.goes_on(code);
+        let Some(known) = self.record_mut(code).suspicion.as_deref_mut().filter(|_| goes_on) else {
+            return false;
+        };
+        let is_other = suspicion.kind.is_some() && suspicion.kind != known.kind;
+        let (was_sure, is_sure) = (known.is_sure(), suspicion.is_sure());
+        let told = is_sure && !was_sure || is_other && (is_sure || !was_sure);
+        if told || !was_sure && suspicion.kind == known.kind {
+            known.clone_from(suspicion);
         }
-        named
+        told
     }
 
     /// Takes PASSED for `code`. Returns whether the byte changed.

@@ -184,7 +184,7 @@ impl Monitor {
         }
     }
 
-    /// Reports the kind of a fault that was confirmed before its kind was known, or sure.
+    /// Reports the kind of a confirmed fault that goes on, if it is another one, or sure now.
     fn name(
         &self,
         code: FaultCode,
@@ -194,10 +194,10 @@ impl Monitor {
     ) {
         // What told the kind of a servo's fault before may tell none now.
         let shows = |axis| evidence.axes[axis].answer.and_then(|answer| answer.kind()) == self.kind;
-        if self.kind.is_none() || !memory.lacks_kind(code) || !code.axis().is_none_or(shows) {
+        if !memory.goes_on(code) || !code.axis().is_none_or(shows) {
             return;
         }
-        if memory.set_kind(code, &self.suspicion(code, evidence)) {
+        if memory.revise(code, &self.suspicion(code, evidence)) {
             self.announce(code, evidence, memory, transitions);
         }
     }

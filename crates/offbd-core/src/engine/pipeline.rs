@@ -110,6 +110,7 @@ impl Pipeline {
                 breakaway_m_s2: limits[axis].breakaway_m_s2,
                 air_drag_ratio: rig.ball.air_drag_ratio().min(1.0),
                 familiar_m_s2: learnt.map_or(f64::INFINITY, |l| l.familiar_m_s2),
+                confirm_nats: confirm_nats[axis],
             })
         };
         // The evidence for suspicion scales with the evidence for confirmation.

@@ -116,6 +116,22 @@ fn a_repaired_servo_passes_whenever_it_broke() {
     }
 }
 
+/// What a servo does after its repair does not tell what was broken.
+#[test]
+fn a_repair_does_not_change_the_kind() {
+    let setup = learnt(Preset::Chapter);
+    for seed in 1..5 {
+        let fault = "x_servo:slow@20-60";
+        let samples = session(Preset::Chapter, Reference::Lissajous, 120.0, seed, fault);
+        let found = transitions(&setup, &samples);
+        let of_servo: Vec<_> = found.iter().filter(|t| t.code == FaultCode::XServo).collect();
+        let kinds = of_servo.iter().map(|t| (t.at.seconds(), t.suspicion.kind));
+        let kinds: Vec<_> = kinds.collect();
+        assert!(kinds.iter().any(|(t_s, kind)| *t_s < 60.0 && *kind == Some(FaultKind::Slow)));
+        assert_eq!(of_servo.last().unwrap().suspicion.kind, Some(FaultKind::Slow), "{kinds:?}");
+    }
+}
+
 /// A badly tuned controller makes the ball travel more, because it oscillates. That is not a fault
 /// of the rig, which obeys it, and none is found as long as the ball stays off the rim.
 #[test]

@@ -131,39 +131,47 @@ fn clearing_and_acknowledging_are_different_acts() {
     assert_eq!(bench.byte(), "50");
 }
 
-#[test]
-fn a_kind_is_told_once_and_only_of_a_confirmed_failure() {
-    let mut bench = Bench::new(1, true);
-    let of = |kind| Suspicion { kind, ..Suspicion::default() };
-    let (dead, held) = (of(Some(FaultKind::Dead)), of(Some(FaultKind::Held)));
-    assert!(!bench.memory.set_kind(CODE, &dead), "nothing has failed");
-    bench.memory.failed(CODE, &of(None), &Evidence::default());
-    assert!(!bench.memory.set_kind(CODE, &dead), "it is pending");
-    bench.failed();
-    assert!(!bench.memory.set_kind(CODE, &of(None)));
-    assert!(bench.memory.set_kind(CODE, &dead));
-    assert!(!bench.memory.set_kind(CODE, &held), "it has a kind");
-    assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
+/// A suspicion of `kind` with a weight; the rest is an offset.
+fn weighed(kind: FaultKind, weight: f64) -> Suspicion {
+    let each = |kind, weight| crate::diagnosis::Candidate { code: CODE, kind: Some(kind), weight };
+    let candidates = vec![each(kind, weight), each(FaultKind::Offset, 1.0 - weight)];
+    Suspicion { kind: Some(kind), candidates, ..Suspicion::default() }
 }
 
 #[test]
-fn a_probable_kind_is_told_again_once_it_is_sure() {
+fn a_kind_is_told_only_of_a_confirmed_failure() {
     let mut bench = Bench::new(1, true);
-    let of = |kind, weight| {
-        let each =
-            |kind, weight| crate::diagnosis::Candidate { code: CODE, kind: Some(kind), weight };
-        let candidates = vec![each(kind, weight), each(FaultKind::Offset, 1.0 - weight)];
-        Suspicion { kind: Some(kind), candidates, ..Suspicion::default() }
-    };
-    let (dead, held) = (FaultKind::Dead, FaultKind::Held);
-    bench.memory.failed(CODE, &of(dead, 0.6), &Evidence::default());
+    let unknown = Suspicion::default();
+    let (dead, held) = (weighed(FaultKind::Dead, 0.9), weighed(FaultKind::Held, 0.7));
+    assert!(!bench.memory.revise(CODE, &dead), "nothing has failed");
+    bench.memory.failed(CODE, &unknown, &Evidence::default());
+    assert!(!bench.memory.revise(CODE, &dead), "it is pending");
     bench.failed();
-    bench.memory.trip(CODE, &of(dead, 0.6), &bench.rules);
-    assert!(!bench.memory.set_kind(CODE, &of(held, 0.75)), "not sure");
-    assert!(bench.memory.set_kind(CODE, &of(held, 0.8)));
-    assert!(!bench.memory.set_kind(CODE, &of(held, 0.95)), "told already");
-    assert!(!bench.memory.set_kind(CODE, &of(dead, 0.95)), "a fact stays");
-    assert_eq!(bench.memory.record(CODE).kind(), Some(held));
+    bench.memory.trip(CODE, &unknown, &bench.rules);
+    assert!(!bench.memory.revise(CODE, &unknown));
+    assert!(bench.memory.revise(CODE, &dead));
+    assert!(!bench.memory.revise(CODE, &dead), "it is known");
+    assert!(!bench.memory.revise(CODE, &held), "what is sure stays");
+    assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
+    bench.passed();
+    assert!(!bench.memory.revise(CODE, &weighed(FaultKind::Held, 0.9)), "it has passed");
+}
+
+#[test]
+fn a_kind_is_revised_as_long_as_its_fault_lasts() {
+    let mut bench = Bench::new(1, true);
+    let (dead, held) = (FaultKind::Dead, FaultKind::Held);
+    bench.memory.failed(CODE, &weighed(dead, 0.6), &Evidence::default());
+    bench.memory.trip(CODE, &weighed(dead, 0.6), &bench.rules);
+    assert!(!bench.memory.revise(CODE, &weighed(dead, 0.7)), "not sure");
+    let present = bench.memory.record(CODE).suspicion.clone().unwrap();
+    assert_eq!(present.kind_weight(), Some(0.7), "the weights are the present ones");
+    assert!(bench.memory.revise(CODE, &weighed(held, 0.6)), "another kind is likelier");
+    assert!(bench.memory.revise(CODE, &weighed(held, 0.8)), "it is sure now");
+    assert!(!bench.memory.revise(CODE, &weighed(held, 0.95)), "told already");
+    assert!(!bench.memory.revise(CODE, &weighed(dead, 0.75)), "what is sure stays");
+    assert!(bench.memory.revise(CODE, &weighed(dead, 0.95)), "unless another kind is sure");
+    assert_eq!(bench.memory.record(CODE).kind(), Some(dead));
 }
 
 #[test]
@@ -223,15 +231,6 @@ fn the_last_suspicion_counts() {
     assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Held));
     bench.memory.trip(CODE, &of(FaultKind::Dead), &bench.rules);
     assert_eq!(bench.memory.record(CODE).kind(), Some(FaultKind::Dead));
-}
-
-#[test]
-fn a_kind_is_not_told_after_the_failure_has_passed() {
-    let mut bench = Bench::new(1, false);
-    bench.failed();
-    bench.passed();
-    let dead = Suspicion { kind: Some(FaultKind::Dead), ..Suspicion::default() };
-    assert!(!bench.memory.set_kind(CODE, &dead));
 }
 
 #[test]

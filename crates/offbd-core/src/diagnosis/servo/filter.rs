@@ -34,11 +34,14 @@ pub(super) struct ParameterPrior {
     pub(super) memory_s: [f64; PARAMETERS],
 }
 
-/// Estimates of the parameters, with their covariance.
+/// Each pair of parameters once.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+/// Estimates of the parameters, with the covariance of each of the [`PAIRS`].
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct ParameterEstimates {
     values: [f64; PARAMETERS],
-    covariance: [[f64; PARAMETERS]; PARAMETERS],
+    covariance: [f64; PAIRS.len()],
 }
 
 /// The interval between two readings.
@@ -118,7 +121,8 @@ impl ServoFilter {
     /// Estimates of all parameters.
     pub(super) fn parameters(&self) -> ParameterEstimates {
         let values = core::array::from_fn(|k| self.state[2 + k]);
-        ParameterEstimates { values, covariance: self.spread() }
+        let covariance = PAIRS.map(|(i, j)| self.covariance[2 + i][2 + j]);
+        ParameterEstimates { values, covariance }
     }
 
     /// Replaces the estimates of the parameters; those of the ball's motion are kept, and are
@@ -130,8 +134,9 @@ impl ServoFilter {
             }
         }
         self.state[2..].copy_from_slice(&parameters.values);
-        for (row, known) in self.covariance[2..].iter_mut().zip(parameters.covariance) {
-            row[2..].copy_from_slice(&known);
+        for ((i, j), covariance) in PAIRS.into_iter().zip(parameters.covariance) {
+            self.covariance[2 + i][2 + j] = covariance;
+            self.covariance[2 + j][2 + i] = covariance;
         }
     }
 

@@ -104,13 +104,13 @@ const GUST_M_S2: f64 = 0.03;
 /// Duration of a gust, s.
 const GUST_S: f64 = 2.0;
 
-/// Evidence from which on a servo is broken beyond doubt, nats. The healthy hypothesis then begins
-/// again with the parameters from before the fault, as it does whenever the evidence is at its
-/// largest: otherwise it learns an offset as the level of the session, the test passes while the
-/// fault lasts, and its repair is a new fault. It does not keep these parameters: those of a session
-/// that has just begun are hardly known, and a repaired servo would never seem healthy. Chosen: well
-/// beyond the 13 that confirm a fault.
-const BROKEN_NATS: f64 = 20.0;
+/// Evidence from which on a servo is broken beyond doubt, as a multiple of what confirms a fault. The
+/// healthy hypothesis then begins again with the parameters from before the fault, as it does whenever
+/// the evidence is at its largest: otherwise it learns an offset as the level of the session, the test
+/// passes while the fault lasts, and its repair is a new fault. It does not keep these parameters:
+/// those of a session that has just begun are hardly known, and a repaired servo would never seem
+/// healthy. Chosen: 19.5 nats if 13 confirm a fault.
+const BROKEN_SHARE: f64 = 1.5;
 
 /// Largest accumulated evidence, nats: limits how long it takes to fall after a servo has
 /// recovered. Chosen.
@@ -129,6 +129,8 @@ pub struct AxisPrior {
     pub air_drag_ratio: f64,
     /// Largest acceleration with which gain and delay were learnt, m/s².
     pub familiar_m_s2: f64,
+    /// Evidence that confirms a fault, nats; infinite if none does.
+    pub confirm_nats: f64,
 }
 
 /// What was learnt of an axis from healthy sessions.
@@ -159,6 +161,13 @@ impl AxisPrior {
             prior.deviation[k] = deviation;
         }
         prior
+    }
+
+    /// Returns the evidence from which on a servo is broken beyond doubt, nats; infinite if none
+    /// confirms a fault.
+    fn broken_nats(&self) -> f64 {
+        let nats = BROKEN_SHARE * self.confirm_nats;
+        if nats.is_finite() { nats.min(MAX_NATS) } else { nats }
     }
 
     /// Returns the spectral density of the acceleration that the twin does not explain,
@@ -274,8 +283,9 @@ impl ServoFilterBank {
         } else {
             self.rising_since = self.rising_since.or(Some(last.t));
         }
-        let breaks = before < BROKEN_NATS && self.nats >= BROKEN_NATS;
-        if breaks || self.nats >= MAX_NATS {
+        let broken_nats = self.prior.broken_nats();
+        let rises = before < broken_nats || self.nats >= MAX_NATS;
+        if self.nats >= broken_nats && rises {
             self.healthy.set_parameters(&self.unaccused);
         }
         self.stay(&step, y, variance);
@@ -286,12 +296,12 @@ impl ServoFilterBank {
     fn stay(&mut self, step: &FilterStep, y: f64, variance: f64) {
         match &mut self.staying {
             Some(staying) if self.nats == 0.0 => {
-                if staying.was_broken() {
+                if staying.most_nats() >= self.prior.broken_nats() {
                     self.path.exonerate();
                 }
                 self.staying = None;
             }
-            Some(staying) => staying.follow(step, y, variance, self.nats >= BROKEN_NATS),
+            Some(staying) => staying.follow(step, y, variance, self.nats),
             None if self.nats >= CLASSIFIED_NATS => {
                 self.staying = Some(Box::new(StayingFault::new(y, variance)));
             }
