@@ -56,13 +56,18 @@ test("a rule is changed in the page, and what the form does not hold stays", asy
   const dialog = view.getByRole("dialog", { name: "Edit the rule everything" });
   await dialog.getByLabel("Rigs").fill("bench*");
   await dialog.getByLabel("suspected").check();
+  await dialog.getByLabel("Nothing is sent from").fill("22:00");
+  assert.ok(await dialog.getByRole("button", { name: "Save" }).isDisabled(), "quiet hours without an end");
+  await dialog.getByLabel(/^to \(/).fill("06:30");
   await dialog.getByRole("button", { name: "Save" }).click();
   await dialog.waitFor({ state: "detached" });
+  await view.getByText(/not from 22:00 to 06:30 \(.+\)/).waitFor();
   const [rule] = (await ask(service.url, "GET", "/notifications/rules")).items;
   assert.deepEqual(
     [rule.id, rule.asset, rule.silent_until, rule.enabled, [...rule.changes].sort()],
     [before.id, "bench*", before.silent_until, true, ["confirmed", "passed", "pending"]],
   );
+  assert.deepEqual([rule.quiet_hours.from, rule.quiet_hours.to], ["22:00", "06:30"]);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

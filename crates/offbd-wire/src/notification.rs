@@ -204,8 +204,32 @@ pub struct NewRuleView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schema(minimum = 1, maximum = 86_400)]
     pub delay_s: Option<u32>,
+    /// Hours of each day in which nothing is sent; null or absent for none. A fault that begins in
+    /// them has its first message at their end, if it still fails and nobody has acknowledged it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub quiet_hours: Option<QuietHoursView>,
     #[serde(default = "yes")]
     pub enabled: bool,
+}
+
+/// Hours of each day, which may contain midnight.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuietHoursView {
+    /// Beginning, `hh:mm`.
+    #[schema(example = "22:00")]
+    pub from: String,
+    /// End, `hh:mm`, other than the beginning.
+    #[schema(example = "06:30")]
+    pub to: String,
+    /// Time zone, as in the IANA database.
+    #[serde(default = "utc")]
+    #[schema(example = "Europe/Berlin")]
+    pub time_zone: String,
+}
+
+fn utc() -> String {
+    "UTC".to_owned()
 }
 
 fn any() -> String {

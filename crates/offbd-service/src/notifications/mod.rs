@@ -17,6 +17,7 @@
 
 mod courier;
 mod planner;
+mod quiet_hours;
 mod reminders;
 mod retry;
 mod rules;

@@ -100,7 +100,7 @@ impl<T: NotificationTransport> Context<T> {
 
     /// Returns the faults whose first message is delayed.
     async fn waiting(&self, rules: &[&ActiveRule]) -> Result<Waiting, ServiceError> {
-        if rules.iter().all(|rule| rule.delay().is_none()) {
+        if !rules.iter().any(|rule| rule.may_wait()) {
             return Ok(Waiting::new());
         }
         let rows = self.handles.store.reminders_at(NOT_TOLD).await?;
@@ -163,8 +163,8 @@ impl<T: NotificationTransport> Context<T> {
                 // The end of a fault without a message has no message either.
                 let was_told = event.fails() || waiting.remove(&key).is_none();
                 // A later kind or status does not begin the delay again.
-                let due_at = rule.delay().filter(|_| event.fails() && told);
-                let due_at = due_at.map(|delay| *waiting.entry(key).or_insert(row.at + delay));
+                let due_at = rule.first_due(row.at, now).filter(|_| event.fails() && told);
+                let due_at = due_at.map(|due_at| *waiting.entry(key).or_insert(due_at));
                 is_told_now |= told && was_told && due_at.is_none() && rule.silence(now).is_none();
                 reminders.extend(reminder(rule, row, event, told, (now, due_at), message));
             }
@@ -240,7 +240,7 @@ fn reminder(
     (now, due_at): (Micros, Option<Micros>),
     message: impl Fn() -> NotificationView,
 ) -> Option<NotificationWrite> {
-    if rule.delay().is_none() && rule.repeat().is_none() {
+    if !rule.may_wait() && rule.repeat().is_none() {
         return None;
     }
     let (asset, code) = (row.asset.clone(), event.code.to_string());

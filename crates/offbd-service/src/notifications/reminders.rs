@@ -13,6 +13,10 @@ use offbd_wire::words::AlarmCodeWord;
 /// Reminders that are handled in one turn; the others have their turn a second later.
 const MAX_REMINDERS: u32 = 256;
 
+/// Pause after which a first message that is due finds out whether its fault is still muted, µs.
+/// Chosen.
+const MUTED_PAUSE: Micros = 60_000_000;
+
 impl<T: NotificationTransport> Context<T> {
     /// Handles the reminders that are due.
     pub(super) async fn remind(&self, rules: &Rules) -> Result<(), ServiceError> {
@@ -40,7 +44,7 @@ impl<T: NotificationTransport> Context<T> {
     ) -> Result<Vec<Write>, ServiceError> {
         let code: Option<AlarmCodeWord> = row.code.parse().ok();
         let is_first = row.n == NOT_TOLD;
-        let pause = |rule: &ActiveRule| if is_first { rule.delay() } else { rule.repeat() };
+        let pause = |rule: &ActiveRule| rule.repeat().or(is_first.then_some(MUTED_PAUSE));
         let wanted = found.and_then(|(rule, channel)| Some((rule, channel, pause(rule)?, code?)));
         let Some((rule, channel, pause, code)) = wanted else { return Ok(vec![end(row)]) };
         let tags = self.handles.store.tags_of([row.asset.as_str()]).await?;

@@ -3,6 +3,7 @@
 use serde_json::Value;
 use wildmatch::WildMatch;
 
+use super::quiet_hours::QuietHours;
 use crate::clock::parse_timestamp;
 use offbd_core::diagnosis::StatusByte;
 use offbd_store::{Micros, TagsByAsset};
@@ -15,6 +16,7 @@ pub(super) struct ActiveRule {
     pub(super) id: String,
     pub(super) rule: NewRuleView,
     silent_until: Option<Micros>,
+    quiet_hours: Option<QuietHours>,
     pattern: WildMatch,
 }
 
@@ -30,7 +32,8 @@ impl ActiveRule {
     pub(super) fn new(id: String, rule: NewRuleView) -> Self {
         let silent_until = rule.silent_until.as_deref().and_then(|t| parse_timestamp(t).ok());
         let pattern = WildMatch::new(&rule.asset);
-        Self { id, rule, silent_until, pattern }
+        let quiet_hours = rule.quiet_hours.as_ref().and_then(|view| QuietHours::new(view).ok());
+        Self { id, rule, silent_until, quiet_hours, pattern }
     }
 
     /// Returns whether the rule is for `code` of `asset`, whose tags are among `tags`.
@@ -53,12 +56,24 @@ impl ActiveRule {
 
     /// Returns the end of the silence, if there is one at `now`.
     pub(super) fn silence(&self, now: Micros) -> Option<Micros> {
-        self.silent_until.filter(|until| *until > now)
+        self.silent_until.filter(|until| *until > now).max(self.quiet_end(now))
     }
 
-    /// The time for which a fault must fail before its first message is sent, µs.
-    pub(super) fn delay(&self) -> Option<Micros> {
-        self.rule.delay_s.map(|s| Micros::from(s) * 1_000_000)
+    /// Returns the end of the quiet hours, if `now` is within them.
+    fn quiet_end(&self, now: Micros) -> Option<Micros> {
+        self.quiet_hours.as_ref().and_then(|hours| hours.end(now))
+    }
+
+    /// Returns when the first message of a fault that an event of the time `at` tells is due; `None`
+    /// for at once.
+    pub(super) fn first_due(&self, at: Micros, now: Micros) -> Option<Micros> {
+        let delay = self.rule.delay_s.map(|s| at + Micros::from(s) * 1_000_000);
+        delay.or_else(|| self.quiet_end(now))
+    }
+
+    /// Whether first messages may wait.
+    pub(super) const fn may_wait(&self) -> bool {
+        self.rule.delay_s.is_some() || self.quiet_hours.is_some()
     }
 
     /// The interval of reminders, µs.

@@ -4,6 +4,7 @@
 use data_encoding::BASE64;
 
 use super::TargetPolicy;
+use super::quiet_hours::QuietHours;
 use crate::clock::parse_timestamp;
 use crate::{ServiceError, tags};
 use offbd_core::vocabulary::Invalid;
@@ -213,5 +214,5 @@ pub(crate) fn check_rule(rule: &NewRuleView) -> Result<(), Invalid> {
         let (least, most) = DELAY_S.into_inner();
         return Err(Invalid::new("/delay_s", format!("must be from {least} to {most} s")));
     }
-    Ok(())
+    rule.quiet_hours.as_ref().map_or(Ok(()), |view| QuietHours::new(view).map(drop))
 }

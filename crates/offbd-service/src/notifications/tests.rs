@@ -198,6 +198,27 @@ async fn a_fault_is_told_once_it_has_failed_for_as_long_as_the_rule_waits() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_fault_of_quiet_hours_is_told_at_their_end_if_it_still_fails() {
+    let hours = json!({ "from": "01:00", "to": "02:00" });
+    let fixture = NotifierFixture::new(json!({ "quiet_hours": hours })).await;
+    fixture.pass(HOUR + 60 * SECOND, 600 * SECOND).await;
+    // A loss that ends within them is not told, nor is its end.
+    fixture.change(true).await;
+    fixture.change(false).await;
+    fixture.change(true).await;
+    let sent = fixture.pass(3 * HOUR, 600 * SECOND).await;
+    assert_eq!(sent.len(), 1, "{sent:?}");
+    assert!((7200..7860).contains(&sent[0].0), "{sent:?}");
+    assert_eq!((sent[0].1.as_str(), sent[0].2.as_str()), ("confirmed.v1", "evt_3"));
+    fixture.change(false).await;
+    assert_eq!(fixture.pass(3 * HOUR + 60 * SECOND, 60 * SECOND).await.len(), 1);
+    // Outside of them it is told at once.
+    fixture.pass(24 * HOUR, HOUR).await;
+    fixture.change(true).await;
+    assert_eq!(fixture.pass(24 * HOUR + 60 * SECOND, 60 * SECOND).await.len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_fault_that_is_told_late_is_repeated_from_then_on() {
     let rule = json!({ "delay_s": 600, "repeat_s": 3600 });
     let fixture = NotifierFixture::new(rule).await;

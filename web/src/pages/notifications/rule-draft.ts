@@ -13,7 +13,14 @@ export interface RuleDraft {
   delay: number;
   /** Interval of reminders, s; 0 for none. */
   repeat: number;
+  /** Beginning and end of the quiet hours, `hh:mm`; both empty for none. */
+  quietFrom: string;
+  quietTo: string;
+  timeZone: string;
 }
+
+/** The time zone of the browser. */
+const ownTimeZone = () => Intl.DateTimeFormat().resolvedOptions().timeZone || "UTC";
 
 /** What the form holds at first. */
 export const firstDraft = (channel: string): RuleDraft => ({
@@ -25,6 +32,9 @@ export const firstDraft = (channel: string): RuleDraft => ({
   changes: ["confirmed", "passed"],
   delay: 0,
   repeat: 0,
+  quietFrom: "",
+  quietTo: "",
+  timeZone: ownTimeZone(),
 });
 
 /** What the form of a rule that is there holds at first. */
@@ -37,6 +47,7 @@ export const draftOf = ({
   changes,
   delay_s,
   repeat_s,
+  quiet_hours,
 }: Rule): RuleDraft => ({
   name,
   asset: asset ?? "*",
@@ -46,11 +57,20 @@ export const draftOf = ({
   changes: changes ?? [],
   delay: delay_s ?? 0,
   repeat: repeat_s ?? 0,
+  quietFrom: quiet_hours?.from ?? "",
+  quietTo: quiet_hours?.to ?? "",
+  timeZone: quiet_hours?.time_zone ?? ownTimeZone(),
 });
 
+/** Whether the form can be saved. */
+export const isComplete = ({ name, changes, quietFrom, quietTo }: RuleDraft) =>
+  !!name.trim() && changes.length > 0 && !quietFrom === !quietTo;
+
 /** The rule that the form describes; what the form does not hold is as `before`. */
-export function ruleOf({ delay, repeat, tag, ...settings }: RuleDraft, before?: Rule): NewRule {
+export function ruleOf(draft: RuleDraft, before?: Rule): NewRule {
+  const { delay, repeat, tag, quietFrom, quietTo, timeZone, ...settings } = draft;
   const { enabled = true, silent_until } = before ?? {};
-  const times = { delay_s: delay || null, repeat_s: repeat || null };
+  const quiet_hours = quietFrom && quietTo ? { from: quietFrom, to: quietTo, time_zone: timeZone } : null;
+  const times = { delay_s: delay || null, repeat_s: repeat || null, quiet_hours };
   return { ...settings, ...times, tag: tag.trim() || null, enabled, silent_until };
 }

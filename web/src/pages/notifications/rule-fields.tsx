@@ -32,7 +32,7 @@ interface Props {
   change: (part: Partial<RuleDraft>) => void;
 }
 
-/** Name, rigs, tag, channel, delay and reminders of a rule. */
+/** Name, rigs, tag, channel, delay, reminders and quiet hours of a rule. */
 export function RuleFields({ draft, channels, change }: Props) {
   return (
     <div class="form-row">
@@ -75,6 +75,30 @@ export function RuleFields({ draft, channels, change }: Props) {
         options={withOwn(REPEATS, draft.repeat, "Every")}
         change={(repeat) => change({ repeat })}
       />
+      <QuietHours draft={draft} change={change} />
     </div>
+  );
+}
+
+function QuietHours({ draft, change }: Omit<Props, "channels">) {
+  return (
+    <>
+      <label>
+        Nothing is sent from
+        <input
+          type="time"
+          value={draft.quietFrom}
+          onInput={(e) => change({ quietFrom: e.currentTarget.value })}
+        />
+      </label>
+      <label>
+        to ({draft.timeZone})
+        <input
+          type="time"
+          value={draft.quietTo}
+          onInput={(e) => change({ quietTo: e.currentTarget.value })}
+        />
+      </label>
+    </>
   );
 }

@@ -3,7 +3,7 @@ import { alarmApi, type AlarmChange, type Channel, type Rule } from "../../api/a
 import { ActionButton } from "../../parts/action-button";
 import { ALARM_CODES, alarmCodeTitle, CHANGES } from "../../words/alarm";
 import { CheckGroup } from "./check-group";
-import { draftOf, firstDraft, ruleOf, type RuleDraft } from "./rule-draft";
+import { draftOf, firstDraft, isComplete, ruleOf, type RuleDraft } from "./rule-draft";
 import { RuleFields } from "./rule-fields";
 
 interface Props {
@@ -39,7 +39,7 @@ export function RuleForm({ rule: before, channels, saved }: Props) {
         change={(changes) => change({ changes })}
       />
       <div class="form-end">
-        <ActionButton class="primary" disabled={!draft.name.trim() || !draft.changes.length} action={save}>
+        <ActionButton class="primary" disabled={!isComplete(draft)} action={save}>
           {rule ? "Save" : "Add"}
         </ActionButton>
       </div>

@@ -10,8 +10,9 @@ const MUTE_H = 8;
 
 /** The settings of a rule: every one, so that a change of one keeps the others. */
 function settingsOf(rule: Rule): { [Key in keyof Required<NewRule>]: NewRule[Key] } {
-  const { name, asset, tag, channel, codes, changes, enabled, delay_s, repeat_s, silent_until } = rule;
-  return { name, asset, tag, channel, codes, changes, enabled, delay_s, repeat_s, silent_until };
+  const { name, asset, tag, channel, codes, changes, enabled } = rule;
+  const { delay_s, repeat_s, silent_until, quiet_hours } = rule;
+  return { name, asset, tag, channel, codes, changes, enabled, delay_s, repeat_s, silent_until, quiet_hours };
 }
 
 const isSilent = ({ silent_until }: Rule) => !!silent_until && Date.parse(silent_until) > Date.now();
@@ -24,6 +25,7 @@ interface Props {
 }
 
 export function RuleRow({ rule, channels, refetch }: Props) {
+  const quiet = rule.quiet_hours;
   const codes = rule.codes?.length ? rule.codes.map(alarmCodeTitle).join(", ") : "any fault";
   return (
     <tr>
@@ -39,6 +41,11 @@ export function RuleRow({ rule, channels, refetch }: Props) {
       <td>
         {codes}: {(rule.changes ?? []).map((word) => CHANGES[word]).join("; ")}
         {!!rule.delay_s && <span class="quiet"> if it still fails after {duration(rule.delay_s)}</span>}
+        {quiet && (
+          <span class="quiet">
+            , not from {quiet.from} to {quiet.to} ({quiet.time_zone})
+          </span>
+        )}
       </td>
       <td data-word="by">{rule.channel_name}</td>
       <td data-word="repeated">{rule.repeat_s ? `every ${duration(rule.repeat_s)}` : "–"}</td>
