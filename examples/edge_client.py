@@ -27,7 +27,8 @@ import urllib.parse
 import urllib.request
 
 COLUMNS = ("t_s", "cmd_qx_rad", "cmd_qy_rad", "x_m", "y_m")
-MAX_DELAY_S = 30.0
+MAX_DELAY_S = 5.0
+MAX_RETRY_AFTER_S = 30.0
 TIMEOUT_S = 30.0
 HEADERS = {"Content-Type": "application/json"}
 # With these the service refuses a batch for good. Everything else may pass, also an asset or a
@@ -190,7 +191,7 @@ def problem_of(error):
 def retry_after(error):
     """Returns the delay that the service requests, in seconds."""
     try:
-        return min(max(float(error.headers.get("Retry-After", 0)), 0.0), MAX_DELAY_S)
+        return min(max(float(error.headers.get("Retry-After", 0)), 0.0), MAX_RETRY_AFTER_S)
     except ValueError:
         return 0.0
 

@@ -47,12 +47,13 @@ const sendFile = <T>(
   asset: string,
   file: File,
   values: Record<string, string | number | boolean | undefined>,
+  signal = AbortSignal.timeout(900_000),
 ) =>
   request<T>(`${BASE}/assets/${segment(asset)}/sessions/import${query(values)}`, {
     method: "POST",
     body: file,
     headers: { "content-type": "application/octet-stream" },
-    signal: AbortSignal.timeout(900_000),
+    signal,
   });
 
 export const api = {
@@ -109,8 +110,8 @@ export const api = {
   removeRemark: (session: string, id: string) =>
     send<void>("DELETE", `/sessions/${segment(session)}/remarks/${segment(id)}`),
   /** Reads a file without importing it. */
-  inspectRecording: (asset: string, file: File, reading: FileReading) =>
-    sendFile<FileInspection>(asset, file, { ...reading, dry_run: true }),
+  inspectRecording: (asset: string, file: File, reading: FileReading, signal: AbortSignal) =>
+    sendFile<FileInspection>(asset, file, { ...reading, dry_run: true }, signal),
   importRecording: (asset: string, name: string, file: File, reading: FileReading) =>
     sendFile<ImportResult>(asset, file, { ...reading, name }),
   replay: (session: string, settings: ReplaySettings) =>

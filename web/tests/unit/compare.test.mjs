@@ -5,6 +5,7 @@ import {
   alignedMarks,
   alignedTrace,
   commonRange,
+  difference,
   readCompare,
   valuesAt,
 } from "../../src/pages/compare/align.ts";
@@ -47,4 +48,18 @@ test("of two curves in one chart, each has its latest value at a moment", () => 
   assert.deepEqual(valuesAt(data, 2.5), [7, 2]);
   assert.deepEqual(valuesAt(data, 3), [7, null]);
   assert.deepEqual(valuesAt(data, 0), [5, undefined]);
+});
+
+test("the difference of two curves is known where both are", () => {
+  const first = [
+    [0, 1, 2, 3, 9],
+    [1, 2, null, 4, 5],
+  ];
+  const second = [
+    [0.5, 1.5, 2.5, 3.5, 8.5, 9.5],
+    [10, 20, 30, null, 80, 90],
+  ];
+  assert.deepEqual(difference(first, second), [first[0], [null, -13, null, null, -80]]);
+  assert.deepEqual(difference(first, first)[1], [0, 0, null, 0, 0]);
+  assert.deepEqual(difference(first, [[], []])[1], [null, null, null, null, null]);
 });

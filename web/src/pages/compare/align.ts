@@ -31,6 +31,32 @@ export function valuesAt([t, ...lines]: ChartData, at: number): (number | null |
   });
 }
 
+/** Longest time between two values over which a line is drawn through them, s. */
+const MAX_STEP_S = 1;
+
+type Curve = [number[], (number | null)[]];
+
+/** Returns the value of a curve at the time `at`; null beyond its values and in their gaps. */
+function interpolated([t, values]: Curve, at: number, after: number): number | null {
+  const [to, end] = [values[after], t[after]];
+  if (to == null || end === undefined || end - at > MAX_STEP_S) return null;
+  if (end === at) return to;
+  const [from, start] = [values[after - 1], t[after - 1]];
+  if (from == null || start === undefined || end - start > MAX_STEP_S) return null;
+  return from + ((to - from) * (at - start)) / (end - start);
+}
+
+/** Returns the first curve minus the second one, at the moments of the first. */
+export function difference([t, values]: Curve, other: Curve): Curve {
+  let after = 0;
+  const at = (moment: number, i: number) => {
+    while (after < other[0].length && other[0][after]! < moment) after++;
+    const [value, subtracted] = [values[i], interpolated(other, moment, after)];
+    return value == null || subtracted === null ? null : value - subtracted;
+  };
+  return [t, t.map(at)];
+}
+
 export interface CompareAddress {
   a?: string;
   b?: string;

@@ -7,7 +7,7 @@ import { ChartKey } from "../../parts/charts/chart-key";
 import { CHART_KINDS, type ChartKind, type ChartKindName } from "../../parts/charts/chart-kinds";
 import { CursorValues } from "../../parts/charts/cursor-values";
 import { LineChart, type ChartData } from "../../parts/charts/line-chart";
-import { alignedTrace, valuesAt } from "./align";
+import { alignedTrace, difference, valuesAt } from "./align";
 import type { Recording } from "./use-recording";
 
 const HEIGHT = 160;
@@ -22,7 +22,7 @@ interface Props {
   onZoom: (range: [number, number] | undefined) => void;
 }
 
-/** Returns the kind with its first line for each of two recordings, of these names. */
+/** Returns the kind with its first line for each of two recordings, of these names, and for their difference. */
 function overlaidKind(name: ChartKindName, names: [string, string]): ChartKind {
   const kind: ChartKind = CHART_KINDS[name];
   const line = kind.lines[0]!;
@@ -30,11 +30,18 @@ function overlaidKind(name: ChartKindName, names: [string, string]): ChartKind {
   const lines = [
     { ...line, label: a, colour: "measured" },
     { ...line, label: b, colour: "residual", dash: [6, 3] },
+    { ...line, label: "first − second", colour: "twin", width: 1 },
   ];
-  return { ...kind, lines, band: undefined, showsGates: false, about: `of ${a} and of ${b}` };
+  return {
+    ...kind,
+    lines,
+    band: undefined,
+    showsGates: false,
+    about: `of ${a} and of ${b}, and their difference`,
+  };
 }
 
-/** The first quantity of a kind of chart in two recordings, in one chart. */
+/** The first quantity of a kind of chart in two recordings and its difference, in one chart. */
 export function OverlaidChart({ kind: name, axis, a, b, shift, range, onZoom }: Props) {
   const element = useRef<HTMLDivElement>(null);
   const key = useRef<HTMLSpanElement>(null);
@@ -46,12 +53,13 @@ export function OverlaidChart({ kind: name, axis, a, b, shift, range, onZoom }: 
   );
   const data = useMemo(() => {
     const { column, factor = 1 } = kind.lines[0]!;
-    const table = (recording: Recording, start: number): uPlot.AlignedData => {
+    const curve = (recording: Recording, start: number): [number[], (number | null)[]] => {
       const buffer = TraceBuffer.of(alignedTrace(recording.trace, start));
       const values = { ...buffer.shared, ...buffer[axis] }[column];
       return [buffer.t, values.map((value) => (value === null ? null : value * factor))];
     };
-    return uPlot.join([table(a, 0), table(b, shift)]) as ChartData;
+    const curves = [curve(a, 0), curve(b, shift)] as const;
+    return uPlot.join([...curves, difference(...curves)]) as ChartData;
   }, [kind, axis, a, b, shift]);
   const latest = useLatest(data);
   useEffect(() => {

@@ -14,7 +14,7 @@ interface Props {
   onZoom: (range: [number, number] | undefined) => void;
 }
 
-/** The charts of two recordings, each with a curve of both. */
+/** The charts of two recordings, each with a curve of both and of their difference. */
 export function OverlaidCharts({ kinds, ...chart }: Props) {
   const { a, b } = chart;
   return (

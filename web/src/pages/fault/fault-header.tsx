@@ -5,7 +5,6 @@ import { faultReportPath, rigPath } from "../../router/paths";
 import { faultTitle } from "../../words/fault-names";
 import { presenceOf, stateOf } from "../../words/fault-state";
 import { FaultActions } from "./fault-actions";
-import { isActive } from "./is-active";
 
 export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: () => Promise<unknown> }) {
   const { asset, code } = fault;
@@ -20,7 +19,7 @@ export function FaultHeader({ fault, refetch }: { fault: FaultEntry; refetch: ()
         </h1>
         <Link to={faultReportPath(asset, code)}>Report to print</Link>
       </div>
-      {isActive(fault) && <FaultActions fault={fault} refetch={refetch} />}
+      {fault.status !== "cleared" && <FaultActions fault={fault} refetch={refetch} />}
     </header>
   );
 }

@@ -35,8 +35,8 @@ function presentText(fault: FaultEntry, history: HistoryEntry[]): string {
 /** The fault in one sentence and how it stands now, or the note that it is not active. */
 export function FaultSummary({ fault, history }: { fault: FaultEntry; history: HistoryEntry[] }) {
   const { code, status } = fault;
+  const failure = latestFailure(history);
   if (isActive(fault)) {
-    const failure = latestFailure(history);
     const seen = failure
       ? sentence(failure.summary)
       : `${capitalised(faultMeaning(fault, !isFailing(fault)))}.`;
@@ -58,6 +58,7 @@ export function FaultSummary({ fault, history }: { fault: FaultEntry; history: H
           ? "It healed after enough sessions without the fault."
           : "It has not been detected since it was last cleared."}
       </p>
+      {status === "healed" && failure && <p>At its last failure: {sentence(failure.summary)}</p>}
     </EmptyState>
   );
 }

@@ -12,7 +12,7 @@ const ANY_RIG = "any";
 
 /**
  * Lets the service read a file without importing it, as the files of a rig if one is chosen; again after each
- * change of the mapping. What was found last stays while the file is read again.
+ * change of the mapping, which ends the reading before. What was found last stays meanwhile.
  */
 export function useInspection(file: File, rig: string | undefined) {
   const [reading, setReading] = useState<FileReading>({});
@@ -20,20 +20,21 @@ export function useInspection(file: File, rig: string | undefined) {
   const [problem, setProblem] = useState<string>();
   const [isBusy, setBusy] = useState(true);
   useEffect(() => {
-    let isLatest = true;
+    const superseded = new AbortController();
+    const isLatest = () => !superseded.signal.aborted;
     const found = async () => {
       if (file.size > MAX_BYTES) throw new Error("The file is larger than 128 MiB. Split it.");
-      return api.inspectRecording(rig ?? ANY_RIG, file, reading);
+      return api.inspectRecording(rig ?? ANY_RIG, file, reading, superseded.signal);
     };
     setBusy(true);
     setProblem(undefined);
     found()
       .then(
-        (result) => isLatest && setInspection(result),
-        (error: unknown) => isLatest && setProblem(errorText(error)),
+        (result) => isLatest() && setInspection(result),
+        (error: unknown) => isLatest() && setProblem(errorText(error)),
       )
-      .finally(() => isLatest && setBusy(false));
-    return () => void (isLatest = false);
+      .finally(() => isLatest() && setBusy(false));
+    return () => superseded.abort();
   }, [file, rig, reading]);
   const setColumns = (columns: string) => setReading((before) => ({ ...before, columns }));
   const change = (part: Partial<Mapping>) =>
