@@ -84,8 +84,11 @@ pub fn compare(recorded: &[FaultView], replayed: &[FaultView]) -> Vec<ComparedTr
             all.extend(compared(l.map(|l| (l, &recorded[l])), r.map(|r| (r, &replayed[r]))));
         }
     }
-    let time =
-        |one: &ComparedTransition| one.view.recorded_t_s.or(one.view.replayed_t_s).unwrap_or(0.0);
+    // A transition that has moved is at the earlier of its times.
+    let time = |one: &ComparedTransition| {
+        let times = [one.view.recorded_t_s, one.view.replayed_t_s];
+        times.into_iter().flatten().fold(f64::INFINITY, f64::min)
+    };
     // At equal times, recorded transitions come first, each side in its own order.
     let order = |one: &ComparedTransition| (one.recorded.is_none(), one.recorded, one.replayed);
     all.sort_by(|a, b| time(a).total_cmp(&time(b)).then_with(|| order(a).cmp(&order(b))));
@@ -216,6 +219,15 @@ mod tests {
         let mut dead = x(10.0);
         dead.kind = Some(KindWord::Dead);
         assert_eq!(changes(&compare(&[x(10.0)], &[dead])), [(Altered, Some(0.0))]);
+    }
+
+    #[test]
+    fn a_transition_that_has_moved_is_at_the_earlier_of_its_times() {
+        let y = |t_s| fault(FaultCode::YServo, FaultStatus::Pending, t_s);
+        let found = compare(&[y(15.0), x(20.9)], &[x(4.9), y(16.0)]);
+        let times = found.iter().map(|one| (one.view.recorded_t_s, one.view.replayed_t_s));
+        let wanted = [(Some(20.9), Some(4.9)), (Some(15.0), Some(16.0))];
+        assert_eq!(times.collect::<Vec<_>>(), wanted);
     }
 
     fn verdict() -> impl Strategy<Value = Vec<FaultView>> {

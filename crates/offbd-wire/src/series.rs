@@ -124,7 +124,7 @@ pub fn write_csv(out: &mut impl Write, series: &SeriesView) -> io::Result<()> {
 pub struct AnnotationView {
     /// Time at which the service learnt of the transition, ms since 1970.
     pub time: i64,
-    /// Asset, code and status, such as `bench-1: x_servo confirmed`.
+    /// Asset, code and status, such as `bench-1: X servo confirmed`.
     pub title: String,
     /// The transition in one sentence.
     pub text: String,

@@ -10,7 +10,9 @@ use utoipa::ToSchema;
 use super::asset::AssetView;
 use super::memory::{FaultRecordView, StatusBitsView};
 use super::service::{FaultEntryView, SessionView, StateView};
-use super::verdict::{CandidateView, EvidenceView, fault_title, is_probable, kind_weight};
+use super::verdict::{
+    CandidateView, EvidenceView, code_words, fault_title, is_probable, kind_weight,
+};
 use super::words::{CodeWord, KindWord, StatusWord};
 
 /// The versions of SOVD that the service speaks.
@@ -332,12 +334,7 @@ pub fn fault_item(entry: &FaultEntryView) -> SovdFaultView {
 
 /// The name of a fault for people.
 fn fault_name(code: CodeWord, kind: Option<KindWord>, candidates: &[CandidateView]) -> String {
-    let name = match code {
-        CodeWord::XServo => "x servo",
-        CodeWord::YServo => "y servo",
-        CodeWord::StuckBall => "stuck ball",
-        CodeWord::Sensor => "position sensor",
-    };
+    let name = code_words(code.into());
     let weight = kind_weight(kind, candidates);
     match weight.filter(|&weight| is_probable(weight)) {
         Some(weight) => fault_title(name, kind, weight),

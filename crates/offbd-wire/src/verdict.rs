@@ -5,7 +5,7 @@ mod kind_words;
 mod outcome;
 mod sentence;
 
-pub use kind_words::{fault_title, is_probable, kind_words, status_words};
+pub use kind_words::{code_title, code_words, fault_title, is_probable, kind_words, status_words};
 pub use outcome::{JudgedView, NamedKindView, Outcome};
 pub use sentence::sentence;
 

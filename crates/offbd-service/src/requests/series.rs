@@ -6,7 +6,7 @@ use crate::clock::rfc3339;
 use crate::{Service, ServiceError, views};
 use offbd_store::{Micros, SessionFilter, SessionRow, TrendRow};
 use offbd_wire::series::{AnnotationView, SeriesRowView, SeriesValuesView, SeriesView};
-use offbd_wire::verdict::{FaultView, SummaryView, status_words};
+use offbd_wire::verdict::{FaultView, SummaryView, code_title, status_words};
 use offbd_wire::words::{CodeWord, SeriesAggregate, SessionState};
 
 /// Most sessions that one series reads; with more in its range it is refused, and asks for a
@@ -95,7 +95,12 @@ impl Service {
             let fault: FaultView = views::from_json(&row.document)?;
             Ok(AnnotationView {
                 time: row.at / 1000,
-                title: format!("{}: {} {}", row.asset, row.code, status_words(fault.status.into())),
+                title: format!(
+                    "{}: {} {}",
+                    row.asset,
+                    code_title(fault.code.into()),
+                    status_words(fault.status.into())
+                ),
                 text: fault.summary,
                 tags: format!("{},{},{}", row.asset, row.code, row.status),
             })

@@ -1,7 +1,7 @@
 //! The kind of a fault in words, as a fact or as probable with its weight, and its status.
 
 use offbd_core::diagnosis::SURE_KIND;
-use offbd_core::vocabulary::FaultStatus;
+use offbd_core::vocabulary::{FaultCode, FaultStatus};
 use std::fmt::Display;
 
 /// Whether a kind with this weight is only probable.
@@ -18,12 +18,30 @@ pub fn kind_words(kind: impl Display, weight: f64) -> String {
     }
 }
 
-/// Returns a fault with its kind, if it is known: `x_servo (probably dead, 51 %)`.
+/// Returns a fault with its kind, if it is known: `X servo (probably dead, 51 %)`.
 pub fn fault_title(code: impl Display, kind: Option<impl Display>, weight: f64) -> String {
     match kind {
         Some(kind) => format!("{code} ({})", kind_words(kind, weight)),
         None => code.to_string(),
     }
+}
+
+/// Returns what a code blames, in words for people, as within a sentence.
+#[must_use]
+pub const fn code_words(code: FaultCode) -> &'static str {
+    match code {
+        FaultCode::XServo => "x servo",
+        FaultCode::YServo => "y servo",
+        FaultCode::StuckBall => "stuck ball",
+        FaultCode::Sensor => "position sensor",
+    }
+}
+
+/// Returns what a code blames, as at the beginning of a sentence.
+#[must_use]
+pub fn code_title(code: FaultCode) -> String {
+    let (first, rest) = code_words(code).split_at(1);
+    first.to_uppercase() + rest
 }
 
 /// Returns a status as a word for people, who know a pending fault as a suspected one.

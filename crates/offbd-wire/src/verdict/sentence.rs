@@ -1,6 +1,6 @@
 //! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
-use super::kind_words::{fault_title, is_probable, status_words};
+use super::kind_words::{code_title, code_words, fault_title, is_probable, status_words};
 use super::outcome::is_ambiguous;
 use crate::fault_kind::{Finding, answered_share, kind_text};
 use offbd_core::diagnosis::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
@@ -10,7 +10,7 @@ use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 #[must_use]
 pub fn sentence(transition: &Transition) -> String {
     let Transition { code, status, byte, suspicion, .. } = transition;
-    let name = fault_title(code, suspicion.kind, weight(suspicion));
+    let name = fault_title(code_title(*code), suspicion.kind, weight(suspicion));
     match status {
         FaultStatus::Cleared => format!("{name} cleared"),
         FaultStatus::Healed => format!("{name} healed: enough good sessions followed"),
@@ -44,7 +44,8 @@ fn weight(suspicion: &Suspicion) -> f64 {
 fn undecided(suspicion: &Suspicion) -> String {
     let candidates = &suspicion.candidates;
     let weighed = |word: String, c: &Candidate| format!("{word} {:.0} %", 100.0 * c.weight);
-    let causes = || candidates.iter().map(|c| weighed(fault_title(c.code, c.kind, 1.0), c));
+    let causes =
+        || candidates.iter().map(|c| weighed(fault_title(code_words(c.code), c.kind, 1.0), c));
     let kinds = || candidates.iter().filter_map(|c| Some(weighed(c.kind?.to_string(), c)));
     match (is_ambiguous(suspicion), suspicion.kind) {
         (true, _) => format!("cannot tell {}; ", causes().collect::<Vec<_>>().join(" from ")),

@@ -52,7 +52,10 @@ fn failure(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> Tran
 fn findings_of(code: FaultCode, kind: Option<FaultKind>, evidence: Evidence) -> String {
     let sentence = sentence(&failure(code, kind, evidence));
     let (head, findings) = sentence.split_once(": ").unwrap();
-    assert_eq!(head, format!("{} confirmed since 4.50 s", fault_title(code, kind, 1.0)));
+    assert_eq!(
+        head,
+        format!("{} confirmed since 4.50 s", fault_title(code_title(code), kind, 1.0))
+    );
     findings.to_owned()
 }
 
@@ -117,16 +120,16 @@ fn a_kind_that_is_only_probable_is_not_told_as_a_fact() {
     };
     let doubtful = sentence(&of(0.512));
     let wanted =
-        "x_servo (probably dead, 51 %) confirmed since 4.50 s: the x servo probably does not ";
+        "X servo (probably dead, 51 %) confirmed since 4.50 s: the x servo probably does not ";
     assert!(doubtful.starts_with(wanted), "{doubtful}");
     let sure = sentence(&of(0.9));
-    let wanted = "x_servo (dead) confirmed since 4.50 s: the x servo does not ";
+    let wanted = "X servo (dead) confirmed since 4.50 s: the x servo does not ";
     assert!(sure.starts_with(wanted), "{sure}");
     let mut passing = of(0.512);
     passing.byte.passed();
     let passing = sentence(&passing);
     assert!(
-        passing.starts_with("x_servo (probably dead, 51 %) passes its test again"),
+        passing.starts_with("X servo (probably dead, 51 %) passes its test again"),
         "{passing}"
     );
 }
@@ -153,7 +156,7 @@ fn regress_all_candidates_are_named_the_heaviest_first() {
     alike.evidence.axes.y.command_rad = Some(0.0);
     assert_eq!(
         sentence(&alike),
-        "stuck_ball confirmed since 4.50 s: cannot tell x_servo (dead) 70 % from stuck_ball 30 %; \
+        "Stuck ball confirmed since 4.50 s: cannot tell x servo (dead) 70 % from stuck ball 30 %; \
          the ball has stood still for 1.5 s while the plate asks it to move; tilting by qx would \
          decide, as the drive cycle does: a ball that then rolls along y is not stuck"
     );
@@ -174,7 +177,7 @@ fn regress_all_candidates_are_named_the_heaviest_first() {
         vec![kind(FaultKind::Dead, 0.4), kind(FaultKind::Held, 0.35), kind(FaultKind::Gain, 0.25)];
     let text = sentence(&kinds);
     let wanted =
-        "x_servo confirmed since 4.50 s: cannot tell which kind: dead 40 %, held 35 %, gain 25 %; ";
+        "X servo confirmed since 4.50 s: cannot tell which kind: dead 40 %, held 35 %, gain 25 %; ";
     assert!(text.starts_with(wanted), "{text}");
 }
 
@@ -184,7 +187,7 @@ fn regress_a_test_that_passes_again_is_not_reported_as_a_failure() {
     passing.byte.passed();
     assert_eq!(
         sentence(&passing),
-        "sensor (jump) passes its test again since 5.25 s; it was confirmed"
+        "Position sensor (jump) passes its test again since 5.25 s; it was confirmed"
     );
 }
 
@@ -209,7 +212,7 @@ fn regress_the_words_of_a_status() {
     let mut transition = failure(FaultCode::XServo, Some(FaultKind::Dead), evidence());
     transition.status = FaultStatus::Pending;
     let suspected = sentence(&transition);
-    assert!(suspected.starts_with("x_servo (dead) suspected since 4.50 s: "), "{suspected}");
+    assert!(suspected.starts_with("X servo (dead) suspected since 4.50 s: "), "{suspected}");
     transition.status = FaultStatus::Cleared;
-    assert_eq!(sentence(&transition), "x_servo (dead) cleared");
+    assert_eq!(sentence(&transition), "X servo (dead) cleared");
 }
