@@ -30,7 +30,8 @@ function overlaidKind(name: ChartKindName, names: [string, string]): ChartKind {
   const lines = [
     { ...line, label: a, colour: "measured" },
     { ...line, label: b, colour: "residual", dash: [6, 3] },
-    { ...line, label: "first − second", colour: "twin", width: 1 },
+    // How much higher one counter is says nothing.
+    ...(name === "counter" ? [] : [{ ...line, label: "first − second", colour: "twin", width: 1 }]),
   ];
   return {
     ...kind,
@@ -59,7 +60,8 @@ export function OverlaidChart({ kind: name, axis, a, b, shift, range, onZoom }: 
       return [buffer.t, values.map((value) => (value === null ? null : value * factor))];
     };
     const curves = [curve(a, 0), curve(b, shift)] as const;
-    return uPlot.join([...curves, difference(...curves)]) as ChartData;
+    const differences = kind.lines.length > 2 ? [difference(...curves)] : [];
+    return uPlot.join([...curves, ...differences]) as ChartData;
   }, [kind, axis, a, b, shift]);
   const latest = useLatest(data);
   useEffect(() => {
