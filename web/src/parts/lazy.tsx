@@ -17,10 +17,21 @@ export function Suspense({
   return <Fallback.Provider value={fallback}>{children}</Fallback.Provider>;
 }
 
+/** How the code of each lazy component is loaded. */
+const loaders = new Map<unknown, () => Promise<unknown>>();
+
+/** Starts to load the code of `view`, if it is a lazy one that is not loaded. */
+export function preload(view: VNode): void {
+  // What fails is loaded again at the first rendering.
+  loaders
+    .get(view.type)?.()
+    .catch(() => undefined);
+}
+
 /** Returns a component whose code is loaded by `load` at its first rendering. */
 export function lazy<P extends object>(load: () => Promise<ComponentType<P>>): (props: P) => VNode {
   let loaded: ComponentType<P> | undefined;
-  return function Lazy(props: P) {
+  function Lazy(props: P) {
     const [, setShown] = useState(false);
     const [hasFailed, setFailed] = useState(false);
     const fallback = useContext(Fallback);
@@ -35,5 +46,7 @@ export function lazy<P extends object>(load: () => Promise<ComponentType<P>>): (
     const View = loaded;
     if (hasFailed) return <LoadFailed />;
     return View ? <View {...props} /> : <>{fallback}</>;
-  };
+  }
+  loaders.set(Lazy, load);
+  return Lazy;
 }

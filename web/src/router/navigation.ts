@@ -17,6 +17,9 @@ export function rememberScroll(): void {
 /** How far the page at this address was scrolled when it was left, px; undefined if it is new. */
 export const rememberedScroll = () => (history.state as { scroll?: number } | null)?.scroll;
 
+/** Returns the decoded segments of a path. */
+export const segmentsOf = (path: string) => path.split("/").filter(Boolean).map(decodeURIComponent);
+
 /** The current address: the decoded segments of its path, and its query. */
 export function useLocation(): { segments: string[]; query: URLSearchParams } {
   const [address, setAddress] = useState(location.pathname + location.search);
@@ -30,6 +33,5 @@ export function useLocation(): { segments: string[]; query: URLSearchParams } {
     };
   }, []);
   const url = new URL(address, location.origin);
-  const segments = url.pathname.split("/").filter(Boolean).map(decodeURIComponent);
-  return { segments, query: url.searchParams };
+  return { segments: segmentsOf(url.pathname), query: url.searchParams };
 }
