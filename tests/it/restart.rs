@@ -2,8 +2,9 @@
 //! else from the recording, while the other assets are served.
 
 use crate::support::process::Process;
-use crate::support::{Client, batch, connection, eventually, on_postgres, read_csv, rig, url};
-use offbd::wire::telemetry::sample_view;
+use crate::support::{
+    Client, batch, columns, connection, eventually, on_postgres, read_csv, rig, url,
+};
 use offbd_core::vocabulary::Sample;
 use serde_json::{Value, json};
 use sqlx::{AnyConnection, AssertSqlSafe, Executor};
@@ -291,8 +292,7 @@ async fn a_stretch_of_a_long_recording_is_served_by_itself() {
     // Columns in MessagePack are the fastest way in.
     let samples = long_rig(N);
     for part in samples.chunks(10_000) {
-        let rows = serde_json::to_value(part.iter().map(sample_view).collect::<Vec<_>>()).unwrap();
-        let batch = json!({"session": "s", "samples": rows});
+        let batch = columns("s", part);
         service.client.post_packed("assets/a/telemetry", &batch).await.expect(200);
     }
     let id = service.client.end("a", "s").await["id"].as_str().unwrap().to_owned();
