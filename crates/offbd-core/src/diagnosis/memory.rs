@@ -219,9 +219,9 @@ impl FaultMemory {
     }
 
     /// Takes the `suspicion` of a confirmed fault that goes on. Another kind replaces one that is
-    /// unknown or only probable, and a sure kind replaces any other. As long as the kind is not
-    /// sure, the weights of the candidates are the present ones. Returns whether the record has
-    /// another kind, or is sure of it now.
+    /// unknown or only probable, and a sure kind of a servo's fault, which is weighed against the
+    /// others, replaces any other. As long as the kind is not sure, the weights of the candidates
+    /// are the present ones. Returns whether the record has another kind, or is sure of it now.
     pub fn revise(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
         let goes_on = self.goes_on(code);
         let Some(known) = self.record_mut(code).suspicion.as_deref_mut().filter(|_| goes_on) else {
@@ -229,7 +229,8 @@ impl FaultMemory {
         };
         let is_other = suspicion.kind.is_some() && suspicion.kind != known.kind;
         let (was_sure, is_sure) = (known.is_sure(), suspicion.is_sure());
-        let told = is_sure && !was_sure || is_other && (is_sure || !was_sure);
+        let is_weighed = code.axis().is_some();
+        let told = is_sure && !was_sure || is_other && (is_sure && is_weighed || !was_sure);
         if told || !was_sure && suspicion.kind == known.kind {
             known.clone_from(suspicion);
         }

@@ -91,7 +91,7 @@ mod tests {
         assert_eq!(ends("2026-03-28T20:59:59Z"), None);
         assert_eq!(ends("2026-03-28T21:00:00Z").as_deref(), Some("2026-03-29T04:00:00Z"));
         assert_eq!(ends("2026-03-29T20:00:00Z").as_deref(), Some("2026-03-30T04:00:00Z"));
-        // The end falls into the hour that is left out: it is at the first moment after it.
+        // The end falls into the hour that is left out: the clock shows an hour more then.
         let early = view("22:00", "02:30", "Europe/Berlin");
         assert_eq!(end(&early, "2026-03-29T00:30:00Z").as_deref(), Some("2026-03-29T01:30:00Z"));
     }

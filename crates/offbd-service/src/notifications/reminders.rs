@@ -44,7 +44,7 @@ impl<T: NotificationTransport> Context<T> {
     ) -> Result<Vec<Write>, ServiceError> {
         let code: Option<AlarmCodeWord> = row.code.parse().ok();
         let is_first = row.n == NOT_TOLD;
-        let pause = |rule: &ActiveRule| rule.repeat().or(is_first.then_some(MUTED_PAUSE));
+        let pause = |rule: &ActiveRule| if is_first { Some(MUTED_PAUSE) } else { rule.repeat() };
         let wanted = found.and_then(|(rule, channel)| Some((rule, channel, pause(rule)?, code?)));
         let Some((rule, channel, pause, code)) = wanted else { return Ok(vec![end(row)]) };
         let tags = self.handles.store.tags_of([row.asset.as_str()]).await?;

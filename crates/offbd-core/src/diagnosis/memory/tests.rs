@@ -174,6 +174,18 @@ fn a_kind_is_revised_as_long_as_its_fault_lasts() {
     assert_eq!(bench.memory.record(CODE).kind(), Some(dead));
 }
 
+/// What is wrong with the readings may change with each of them.
+#[test]
+fn the_kind_of_a_sensor_fault_stays() {
+    let code = FaultCode::Sensor;
+    let of = |kind| Suspicion { kind: Some(kind), ..Suspicion::default() };
+    let (mut memory, noise) = (FaultMemory::default(), of(FaultKind::Noise));
+    memory.failed(code, &noise, &Evidence::default());
+    memory.trip(code, &noise, &MemoryRules::default());
+    assert!(!memory.revise(code, &of(FaultKind::Spikes)));
+    assert_eq!(memory.record(code).kind(), Some(FaultKind::Noise));
+}
+
 #[test]
 fn occurrences_remember_the_first_and_the_last_onset() {
     let mut bench = Bench::new(1, false);
