@@ -329,7 +329,7 @@ mod tests {
         let mut screen = Screen { asset: "rig".to_owned(), ..Screen::default() };
         let first = screen.transition(&fault);
         assert_eq!(first[..2], ["rig, monday", HEADING]);
-        assert!(first[2].starts_with("    2.50 s  x_servo "), "{first:?}");
+        assert!(first[2].starts_with("    2.50 s  X servo "), "{first:?}");
         assert_eq!(screen.transition(&fault), first[2..]);
         let mut terminal = Screen { redraws: true, ..Screen::default() };
         assert_eq!(terminal.transition(&fault), first[2..], "the session is in the state's lines");
