@@ -153,7 +153,7 @@ async fn validate_a_fault_arrives_as_a_signed_cloud_event() {
     assert_eq!(data["link"], "https://offbd.example/rigs/a/faults/x_servo");
     assert_eq!(data["event"]["status"], "confirmed");
     assert!(data["event"]["session_id"].is_string(), "{data}");
-    assert!(data["summary"].as_str().unwrap().starts_with("a: x_servo"), "{data}");
+    assert!(data["summary"].as_str().unwrap().starts_with("a: X servo"), "{data}");
     assert!((2..=3).contains(&data["advice"].as_array().unwrap().len()), "{data}");
 
     assert!(is_signed(&confirmed, &secret));
