@@ -5,7 +5,7 @@ import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
 import { recordings } from "./rigs.mjs";
-import { ask, page, started } from "./support.mjs";
+import { SOON, ask, page, started } from "./support.mjs";
 
 let work, service, chromium;
 
@@ -27,7 +27,7 @@ test("the cycle of a learnt rig is shown with its detectable faults, downloaded,
   await view.goto(`${service.url}/rigs/learnt`);
   const card = view.locator("#drive-cycle");
   await card.getByRole("button", { name: "Compute the drive cycle" }).click();
-  await card.getByRole("img", { name: /Set points over/ }).waitFor();
+  await card.getByRole("img", { name: /Set points over/ }).waitFor({ timeout: 3 * SOON });
   const stuck = card.getByRole("row").filter({ hasText: "the ball is stuck" });
   assert.match(await stuck.textContent(), /Stuck ball.*\d\.\d+\ss/);
   assert.equal(await card.getByRole("row").count(), 10, "a heading and nine faults");
