@@ -218,9 +218,9 @@ impl FaultMemory {
         status.test_failed() && status.confirmed()
     }
 
-    /// Takes the `suspicion` of a confirmed fault that goes on. Another kind replaces one that is
-    /// unknown or only probable, and a sure kind of a servo's fault, which is weighed against the
-    /// others, replaces any other. As long as the kind is not sure, the weights of the candidates
+    /// Takes the `suspicion` of a confirmed fault that goes on. A kind replaces one that is unknown,
+    /// and a sure one replaces one that is only probable, or any other of a servo, whose kinds are
+    /// weighed against each other. As long as the kind is not sure, the weights of the candidates
     /// are the present ones. Returns whether the record has another kind, or is sure of it now.
     pub fn revise(&mut self, code: FaultCode, suspicion: &Suspicion) -> bool {
         let goes_on = self.goes_on(code);
@@ -230,7 +230,8 @@ impl FaultMemory {
         let is_other = suspicion.kind.is_some() && suspicion.kind != known.kind;
         let (was_sure, is_sure) = (known.is_sure(), suspicion.is_sure());
         let is_weighed = code.axis().is_some();
-        let told = is_sure && !was_sure || is_other && (is_sure && is_weighed || !was_sure);
+        let is_surer = is_sure && (!was_sure || is_other && is_weighed);
+        let told = is_surer || is_other && known.kind.is_none();
         if told || !was_sure && suspicion.kind == known.kind {
             known.clone_from(suspicion);
         }

@@ -166,7 +166,8 @@ fn a_kind_is_revised_as_long_as_its_fault_lasts() {
     assert!(!bench.memory.revise(CODE, &weighed(dead, 0.7)), "not sure");
     let present = bench.memory.record(CODE).suspicion.clone().unwrap();
     assert_eq!(present.kind_weight(), Some(0.7), "the weights are the present ones");
-    assert!(bench.memory.revise(CODE, &weighed(held, 0.6)), "another kind is likelier");
+    assert!(!bench.memory.revise(CODE, &weighed(held, 0.7)), "another kind is not sure");
+    assert_eq!(bench.memory.record(CODE).kind(), Some(dead));
     assert!(bench.memory.revise(CODE, &weighed(held, 0.8)), "it is sure now");
     assert!(!bench.memory.revise(CODE, &weighed(held, 0.95)), "told already");
     assert!(!bench.memory.revise(CODE, &weighed(dead, 0.75)), "what is sure stays");
