@@ -18,7 +18,7 @@ def test_the_notebook_runs() -> None:
         for output in cell.get("outputs", [])
         if output.get("output_type") == "stream"
     ]
-    assert any("x_servo" in text for text in printed), printed
+    assert any("X servo" in text for text in printed), printed
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     pictures = [output for output in outputs if "image/png" in output.get("data", {})]
     assert len(pictures) == 1
