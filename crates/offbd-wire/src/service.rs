@@ -11,7 +11,7 @@ use super::memory::FaultRecordView;
 use super::provenance::ProvenanceView;
 use super::trace::TraceView;
 use super::trend::TrendWarningView;
-use super::verdict::{EvidenceView, FaultView, SummaryView, evidence_view};
+use super::verdict::{EvidenceView, FaultView, SummaryView, code_title, evidence_view};
 use super::words::{
     AxisWord, ChangeWord, CodeWord, CommandWord, HistoryWord, JobKind, JobState, JobWaitReason,
     KindWord, LineWord, ModelWord, ProfileWord, SessionState, StatusWord,
@@ -161,7 +161,7 @@ pub fn cleared_view(code: FaultCode, by: &str) -> ClearedView {
         axis: code.axis().map(AxisWord::from),
         command: code.axis().map(CommandWord::from),
         by: by.to_owned(),
-        summary: format!("{code} cleared by {by}"),
+        summary: format!("{} cleared by {by}", code_title(code)),
     }
 }
 

@@ -212,7 +212,7 @@ async fn a_fault_of_quiet_hours_is_told_at_their_end_if_it_still_fails() {
     assert_eq!((sent[0].1.as_str(), sent[0].2.as_str()), ("confirmed.v1", "evt_3"));
     fixture.change(false).await;
     assert_eq!(fixture.pass(3 * HOUR + 60 * SECOND, 60 * SECOND).await.len(), 1);
-    // Outside of them it is told at once.
+    // A loss outside the quiet hours is sent immediately.
     fixture.pass(24 * HOUR, HOUR).await;
     fixture.change(true).await;
     assert_eq!(fixture.pass(24 * HOUR + 60 * SECOND, 60 * SECOND).await.len(), 1);
