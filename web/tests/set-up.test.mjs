@@ -38,6 +38,7 @@ test("described, connected, corrected, learnt", async () => {
   await view.getByRole("button", { name: "Register and continue" }).click();
   const isValid = () => view.getByLabel("Name").evaluate((field) => field.validity.valid);
   assert.equal(await isValid(), false, "a name with a blank is marked by the browser");
+  assert.equal(await view.getByLabel("Name").getAttribute("title"), "Letters, digits, “-”, “_” and “.”");
   await view.getByLabel("Mass").fill("");
   await view.getByLabel("Mass").press("Enter");
   assert.equal(await view.getByLabel("Mass").evaluate((field) => field.validity.valid), false);
@@ -126,6 +127,7 @@ test("a description that was changed is the one that is changed next", async () 
   await view.goto(`${service.url}/rigs/twice/set-up`);
   await view.getByLabel("Mass").fill("51");
   await view.getByRole("button", { name: "Save and continue" }).click();
+  await view.getByText("Waiting for the first sample").waitFor();
   await view.getByRole("button", { name: "1. Describe" }).click();
   await view.getByLabel("Radius").fill("21");
   await view.getByRole("button", { name: "Save and continue" }).click();

@@ -1,4 +1,4 @@
-import { useState } from "preact/hooks";
+import { useRef, useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { Asset } from "../../api/types";
 import { useRefusal } from "../../parts/login/rights";
@@ -13,10 +13,13 @@ import { UnitFields } from "./unit-fields";
 interface Props {
   /** The registered rig; missing if it is new. */
   asset?: Asset;
-  done: (name: string) => void | Promise<void>;
+  saved: (name: string) => void | Promise<void>;
+  /** Opens the next step; not called if another step or page was opened while the form was saved. */
+  next: (name: string) => void;
 }
 
-export function Describe({ asset, done }: Props) {
+export function Describe({ asset, saved, next }: Props) {
+  const form = useRef<HTMLFormElement>(null);
   const [description, setDescription] = useState(() => describeAsset(asset));
   const set = (part: Partial<Description>) => setDescription((before) => ({ ...before, ...part }));
   const [error, setError] = useState<unknown>();
@@ -30,7 +33,8 @@ export function Describe({ asset, done }: Props) {
     try {
       const wanted = assetOf(description, asset);
       await (asset ? api.putAsset(wanted, asset) : api.createAsset(wanted));
-      await done(description.name);
+      await saved(description.name);
+      if (form.current) next(description.name);
     } catch (thrown) {
       setError(thrown);
     }
@@ -38,7 +42,7 @@ export function Describe({ asset, done }: Props) {
   };
   const fields = { description, set };
   return (
-    <form class="card" onSubmit={submit}>
+    <form ref={form} class="card" onSubmit={submit}>
       <p>
         Measure the ball and the plate and enter them here: verdicts depend on them. The calibration finds the
         rest.

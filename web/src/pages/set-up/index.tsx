@@ -38,10 +38,8 @@ export function SetUpPage({ name }: { name?: string }) {
     return <UnloadedPage title={title} what={name} kind="rig" error={error} retry={refetch} />;
   const goTo = (next: SetUpStep) => navigate(setUpPath(name!, next));
   // The next steps change the description, as it is now.
-  const connect = async (described: string) => {
-    if (described === name) await refetch();
-    navigate(setUpPath(described, "connect"));
-  };
+  const refetchKnown = (described: string) => (described === name ? refetch() : undefined);
+  const connect = (described: string) => navigate(setUpPath(described, "connect"));
   return (
     <main class="set-up">
       <header class="page-head">
@@ -55,7 +53,7 @@ export function SetUpPage({ name }: { name?: string }) {
         </div>
       </header>
       <Steps current={step} asset={asset} hasSamples={samples.data ?? false} goTo={name ? goTo : undefined} />
-      {step === "describe" && <Describe asset={asset} done={connect} />}
+      {step === "describe" && <Describe asset={asset} saved={refetchKnown} next={connect} />}
       {step === "connect" && asset && <Connect asset={asset} next={() => goTo("check")} />}
       {step === "check" && asset && <Check asset={asset} changed={refetch} next={() => goTo("learn")} />}
       {step === "learn" && asset && <Learn asset={asset} changed={refetch} />}
