@@ -56,8 +56,9 @@ pub enum GateOutcome {
     Accepted { outliers: u32, undone: bool },
     /// Refused: an outlier, or the first of a new path.
     Refused,
-    /// Accepted on a path that does not meet the old one.
-    Jumped(PositionJump),
+    /// Accepted on a path that does not meet the old one: readings are now off by `by_m`, or the
+    /// ball was moved.
+    Jumped { jump: PositionJump, by_m: Vector2<f64> },
 }
 
 impl GateOutcome {
@@ -262,9 +263,9 @@ impl OutlierGate {
             }
             let doubtful = off_m > reach(track.at_s).min(jump_m) / 2.0;
             self.before = doubtful.then_some(track);
-            if let Some(jump) = self.jumped(&track, t_s, position_m, noise_m, may_turn) {
+            if let Some(left) = self.left(&track, t_s, position_m, noise_m, may_turn) {
                 self.follow(Track::start(t_s, position_m, BELIEVED_AFTER));
-                return GateOutcome::Jumped(jump);
+                return jumped(left.at_s, left.off_m);
             }
             return self.accept(track.followed_by(t_s, position_m));
         }
@@ -282,23 +283,23 @@ impl OutlierGate {
         self.suspect.is_some()
     }
 
-    /// Returns the jump if accepted readings have stayed beside the track that they left.
-    fn jumped(
+    /// Returns the jump that was suspected if accepted readings have stayed beside the track that
+    /// they left.
+    fn left(
         &mut self,
         track: &Track,
         t_s: f64,
         position_m: Vector2<f64>,
         noise_m: f64,
         may_turn: bool,
-    ) -> Option<PositionJump> {
+    ) -> Option<SuspectedJump> {
         if let Some(suspect) = self.suspect {
             let stays = suspect.is_jump(t_s, position_m);
             let long = t_s - suspect.at_s >= BELIEVED_AFTER_S;
             if long || !stays {
                 self.suspect = None;
             }
-            let jump = PositionJump { at_s: suspect.at_s, size_m: suspect.off_m.norm() };
-            return (stays && long).then_some(jump);
+            return (stays && long).then_some(suspect);
         }
         let off_m = track.off(t_s, position_m);
         let unseen_s = t_s - track.at_s;
@@ -380,9 +381,8 @@ impl OutlierGate {
         let apart = jump_m.amax() > ALLOWED_DEVIATIONS * noise_m + LEAST_JUMP_M + bent_m;
         let bent_m_s = (there.velocity_m_s() - track.velocity_m_s).amax();
         let straight = bent_m_s * BEND_S < jump_m.amax();
-        let jumped = apart && straight && !there.turned && track.n >= BELIEVED_AFTER;
-        let jump = PositionJump { at_s: there.since_s, size_m: jump_m.norm() };
-        if jumped { GateOutcome::Jumped(jump) } else { accepted }
+        let stepped = apart && straight && !there.turned && track.n >= BELIEVED_AFTER;
+        if stepped { jumped(there.since_s, jump_m) } else { accepted }
     }
 
     /// Forgets the track, as after a gap.
@@ -408,6 +408,10 @@ impl OutlierGate {
         (self.track, self.outliers, self.new_path) = (Some(track), 0, None);
         outliers
     }
+}
+
+fn jumped(at_s: f64, by_m: Vector2<f64>) -> GateOutcome {
+    GateOutcome::Jumped { jump: PositionJump { at_s, size_m: by_m.norm() }, by_m }
 }
 
 /// Least distance between the extrapolated old path and the new path extrapolated back,
@@ -442,7 +446,7 @@ mod tests {
         assert_eq!(take(0.64, 0.021), GateOutcome::Accepted { outliers: 1, undone: true });
         for i in 1..20 {
             let gated = take(0.64 + 0.08 * f64::from(i), 0.021);
-            assert!(!matches!(gated, GateOutcome::Jumped(_)), "{i}: {gated:?}");
+            assert!(!matches!(gated, GateOutcome::Jumped { .. }), "{i}: {gated:?}");
         }
     }
 
@@ -455,7 +459,7 @@ mod tests {
                 true => gate.take_at_rim(f64::from(i) * 0.1, along_x(0.05), 1e-3),
                 false => gate.take(f64::from(i) * 0.1, along_x(0.05), 1e-3),
             };
-            (0..10).map(take).any(|gated| matches!(gated, GateOutcome::Jumped(_)))
+            (0..10).map(take).any(|gated| matches!(gated, GateOutcome::Jumped { .. }))
         };
         assert!(jumped(false));
         assert!(!jumped(true));
@@ -480,7 +484,7 @@ mod tests {
         for i in 3..9 {
             assert_eq!(take(i, 0.2), GateOutcome::Refused, "{i}");
         }
-        let GateOutcome::Jumped(jump) = take(9, 0.2) else { panic!("it has stayed there") };
+        let GateOutcome::Jumped { jump, .. } = take(9, 0.2) else { panic!("it has stayed there") };
         assert!((jump.at_s - 0.06).abs() < 1e-12 && (jump.size_m - 0.2).abs() < 2e-3, "{jump:?}");
         assert_eq!(take(10, 0.2), GateOutcome::Accepted { outliers: 0, undone: false });
     }
@@ -501,7 +505,7 @@ mod tests {
         gate.take(0.0, along_x(0.1), 1e-3);
         for i in 1..100 {
             let gated = gate.take(f64::from(i) * 0.02, along_x(0.0), 1e-3);
-            assert!(!matches!(gated, GateOutcome::Jumped(_)), "{i}");
+            assert!(!matches!(gated, GateOutcome::Jumped { .. }), "{i}");
         }
     }
 
@@ -535,7 +539,7 @@ mod tests {
                 true => gate.take_at_rim(f64::from(i) * 0.1, along_x(0.03), 1e-3),
                 false => gate.take(f64::from(i) * 0.1, along_x(0.03), 1e-3),
             };
-            (0..10).map(take).any(|gated| matches!(gated, GateOutcome::Jumped(_)))
+            (0..10).map(take).any(|gated| matches!(gated, GateOutcome::Jumped { .. }))
         };
         assert!(jumped(10), "never at the rim");
         assert!(!jumped(1));
@@ -563,7 +567,7 @@ mod tests {
             let t = f64::from(i) * 0.01;
             // From rest to 1.2 m/s between two readings.
             let gated = gate.take(t, along_x(1.2 * (t - 0.504).max(0.0)), 1e-4);
-            assert!(!matches!(gated, GateOutcome::Jumped(_)), "{t}");
+            assert!(!matches!(gated, GateOutcome::Jumped { .. }), "{t}");
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Whether the ball is at the edge of the plate, and since when.
 
+use nalgebra::Vector2;
+
 use super::Rig;
 use super::frame::Moment;
 use crate::plant::Plate;
@@ -22,6 +24,9 @@ pub(super) struct Edge {
     /// The axis whose rim the ball is at, and for how long, s.
     pub rim: Option<Axis>,
     pub rim_s: f64,
+    /// Sum of the jumps of the readings, m: if the sensor is off, the ball lies this far back from where
+    /// it is read. Zero again once no ball can be there.
+    displaced_m: PerAxis<f64>,
     /// The last two readings, the newest last.
     recent: [Option<(SimTime, PerAxis<f64>)>; 2],
 }
@@ -36,11 +41,19 @@ impl Edge {
             clear_s: 0.0,
             rim: None,
             rim_s: 0.0,
+            displaced_m: PerAxis::default(),
             recent: [None; 2],
         }
     }
 
-    /// Forgets the past, as after a gap.
+    /// The readings have jumped by `by_m`: the sensor is off by as much from now on, or the ball was
+    /// moved. Readings do not tell which.
+    pub(super) fn displace(&mut self, by_m: Vector2<f64>) {
+        self.displaced_m.x += by_m.x;
+        self.displaced_m.y += by_m.y;
+    }
+
+    /// Forgets the past, as after a gap, but not that the sensor may be off.
     pub(super) fn restart(&mut self) {
         self.clear_s = 0.0;
         self.rim_s = 0.0;
@@ -56,11 +69,19 @@ impl Edge {
     /// readings with the largest acceleration of the plate: a slow sensor sees it before
     /// and after the bounce, but not at the rim.
     pub(super) fn may_have_bounced(&self, at: SimTime) -> bool {
+        self.may_turn(at, None)
+    }
+
+    /// As [`Self::may_have_bounced`], but for the rim across the axis at which the ball `lies`.
+    pub(super) fn may_turn(&self, at: SimTime, lies: Option<Axis>) -> bool {
         let [Some((earlier, from)), Some((newest, to))] = self.recent else { return false };
         let share = (at - newest) / (newest - earlier);
-        let ahead = |axis: Axis| to[axis] + share * (to[axis] - from[axis]);
+        let ahead = |axis: Axis| match lies == Some(axis) {
+            true => 0.0,
+            false => to[axis] + share * (to[axis] - from[axis]),
+        };
         let hurried_m = self.most_m_s2 / 2.0 * (at - newest) * (at - earlier);
-        let left_m = self.plate.edge_distance_m(ahead(Axis::X), ahead(Axis::Y));
+        let left_m = self.left_m(&PerAxis::from_fn(ahead));
         self.plate.rim() && left_m < self.room_m + hurried_m
     }
 
@@ -79,9 +100,13 @@ impl Edge {
         let PerAxis { x, y } = moment.position;
         if !refused && x.or(y).is_some() {
             let place = PerAxis { x: x.unwrap_or(0.0), y: y.unwrap_or(0.0) };
-            self.at_edge = self.is_near(place.x, place.y) || self.may_have_bounced(moment.at);
-            let rim = self.plate.edge_axis(place.x, place.y, self.room_m);
-            let rim = rim.filter(|_| self.plate.rim());
+            let [_, other] = self.places(&place);
+            if self.plate.edge_distance_m(other.x, other.y) < 0.0 {
+                // No ball is there, not even its middle: it was moved, and the sensor is right.
+                self.displaced_m = PerAxis::default();
+            }
+            self.at_edge = self.left_m(&place) < self.room_m || self.may_have_bounced(moment.at);
+            let rim = self.rim_of(&place).filter(|_| self.plate.rim());
             self.rim_s = if rim.is_some() && rim == self.rim { self.rim_s + dt } else { 0.0 };
             self.rim = rim;
             self.recent = [self.recent[1], Some((moment.at, place))];
@@ -89,8 +114,24 @@ impl Edge {
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
 
-    fn is_near(&self, x_m: f64, y_m: f64) -> bool {
-        self.plate.edge_distance_m(x_m, y_m) < self.room_m
+    /// The places where the ball may be if it is read at `place`.
+    fn places(&self, place: &PerAxis<f64>) -> [PerAxis<f64>; 2] {
+        [*place, PerAxis::from_fn(|axis| place[axis] - self.displaced_m[axis])]
+    }
+
+    /// The axis whose rim a ball is at that is read at `place`, wherever it may be.
+    fn rim_of(&self, place: &PerAxis<f64>) -> Option<Axis> {
+        let is_near = |at: &PerAxis<f64>| self.plate.edge_distance_m(at.x, at.y) < self.room_m;
+        let near = self.places(place).into_iter().filter(is_near);
+        let mut rims = near.map(|at| self.plate.edge_axis(at.x, at.y, self.room_m));
+        let first = rims.next().flatten();
+        first.filter(|_| rims.all(|rim| rim == first))
+    }
+
+    /// Least distance from the edge of a ball that is read at `place`, m.
+    fn left_m(&self, place: &PerAxis<f64>) -> f64 {
+        let [a, b] = self.places(place).map(|at| self.plate.edge_distance_m(at.x, at.y));
+        a.min(b)
     }
 }
 
@@ -122,6 +163,24 @@ mod tests {
         assert!(!at_edge(&rig, &[0.08, 0.11, 0.10]), "it would have got to 0.14 m");
         let open = Plate::new(rig.plate.shape(), 0.02, false).unwrap();
         assert!(!at_edge(&Rig { plate: open, ..rig }, &[0.08, 0.13, 0.14]), "there is no rim");
+    }
+
+    /// After a jump of the readings the ball may be as far from where it is read.
+    #[test]
+    fn a_jump_of_the_readings_moves_the_rim() {
+        let mut edge = Edge::new(&Rig::chapter("a"));
+        let rest = moments(&[0.13, 0.13, 0.13]);
+        rest.iter().for_each(|m| edge.take(m, 0.01, false));
+        assert!(!edge.at_edge && edge.rim.is_none());
+        edge.displace(Vector2::new(-0.05, 0.0));
+        edge.take(&rest[2], 0.01, false);
+        assert!(edge.at_edge && edge.rim == Some(Axis::X), "it may be at 0.18 m");
+        edge.displace(Vector2::new(0.05, 0.0));
+        edge.take(&rest[2], 0.01, false);
+        assert!(!edge.at_edge, "it has jumped back");
+        edge.displace(Vector2::new(-0.07, 0.0));
+        edge.take(&rest[2], 0.01, false);
+        assert!(!edge.at_edge, "it would be beyond the rim: the ball was moved by hand");
     }
 
     #[test]

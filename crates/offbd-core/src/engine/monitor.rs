@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 /// fail. Chosen.
 const SUSPICIOUS_WEIGHT: f64 = 0.5;
 
+/// Longer than any monitor needs to find a fault, s: the longest debounce has 60 s.
+const LONG_S: f32 = 1000.0;
+
 /// The state of the monitor of one code.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Monitor {
@@ -22,6 +25,9 @@ pub(super) struct Monitor {
     test: Test,
     /// Time of this session for which it could judge, s.
     judged_s: f64,
+    /// That time since a fault of another monitor was last confirmed, less the time for which that fault
+    /// went on and this monitor could not judge, s, in [0, [`LONG_S`]].
+    judged_since_s: f32,
     /// Onset of the present failure.
     since: Option<SimTime>,
     kind: Option<FaultKind>,
@@ -64,6 +70,21 @@ impl Monitor {
         self.judged_s
     }
 
+    pub(super) fn judged_since_s(&self) -> f64 {
+        self.judged_since_s.into()
+    }
+
+    /// Notes that a fault of another monitor is confirmed: from now on this one may not be able to
+    /// judge.
+    pub(super) const fn another_confirmed(&mut self) {
+        self.judged_since_s = 0.0;
+    }
+
+    /// Notes that it could not judge for `dt` seconds in which a fault of another monitor went on.
+    pub(super) fn could_not_judge(&mut self, dt: f64) {
+        self.judged_since_s = (self.judged_since_s - dt as f32).max(0.0);
+    }
+
     /// Takes the finding for the last `dt` seconds. A servo fails by duration of failure,
     /// like every monitor, or by evidence, which has been `rising` since a time; it
     /// passes only if neither is suspicious.
@@ -79,6 +100,7 @@ impl Monitor {
         self.test = finding.test;
         if finding.test != Test::NotTested {
             self.judged_s += dt;
+            self.judged_since_s = (self.judged_since_s + dt as f32).min(LONG_S);
         }
         let test = match finding.gone && self.debounce.failed() {
             true => Test::Prefailed,
@@ -124,7 +146,8 @@ impl Monitor {
         }
     }
 
-    fn suspicious(&self) -> bool {
+    /// Whether much speaks for a fault at present.
+    pub(super) fn suspicious(&self) -> bool {
         self.debounce.suspicious() || self.weight > SUSPICIOUS_WEIGHT
     }
 

@@ -180,8 +180,8 @@ impl Pipeline {
             self.unjudged_s = 0.0;
             self.acceleration_filter.fit();
             self.noisy_m = self.evaluator.noisy_m(self.blur_m().hypot(self.bend_m()));
-            self.collect_evidence(&moment);
-            let around = self.surroundings();
+            let around = self.surroundings(memory);
+            self.collect_evidence(&moment, &around);
             let findings = self.evaluator.evaluate(&self.evidence, &self.readings, &around);
             self.remember(&moment, dt, &findings, memory, transitions);
         }
@@ -309,15 +309,18 @@ impl Pipeline {
         // line.
         let off = |axis: Axis| moment.position[axis].map(|p| p - predicted[axis as usize]);
         let (off_m, noise_m) = (PerAxis::from_fn(off), self.gate_noise_m());
-        let gated = match self.edge.may_have_bounced(moment.at) {
+        // A rim turns a ball that moves towards it, not one that lies at it.
+        let lies = self.edge.rim.filter(|axis| self.readings.axes[*axis].rests());
+        let gated = match self.edge.may_turn(moment.at, lies) {
             true => self.gate.take_at_rim(t, off_m, noise_m),
             false => self.gate.take(t, off_m, noise_m),
         };
         match gated {
-            GateOutcome::Jumped(step) => {
+            GateOutcome::Jumped { jump, by_m } => {
                 self.forget();
                 self.since_jump_s = 0.0;
-                self.jump = Some(step);
+                self.jump = Some(jump);
+                self.edge.displace(by_m);
             }
             // The window holds an outlier that had been accepted.
             GateOutcome::Accepted { undone: true, .. } => self.forget(),
@@ -415,14 +418,16 @@ impl Pipeline {
     }
 
     /// Stage: residual, limit and enable condition.
-    fn collect_evidence(&mut self, moment: &Moment) {
-        let around = self.surroundings();
+    fn collect_evidence(&mut self, moment: &Moment, around: &Surroundings) {
         let window_s = self.acceleration_filter.window_s(self.least_window_s());
         let see = |axis: Axis| {
             let mut e = self.axis_evidence(moment, axis, window_s);
             let pull_m_s2 = self.pull_m_s2(axis);
             e.enabled =
-                self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, &around);
+                self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, around);
+            let suspicious = self.monitors[FaultCode::servo(axis) as usize].suspicious();
+            let answers = self.settings.profile == Profile::Default;
+            e.answer = answers.then(|| self.servos[axis].answer(suspicious));
             e
         };
         let fits = &self.acceleration_filter.fits;
@@ -447,7 +452,8 @@ impl Pipeline {
         };
     }
 
-    /// Returns the evidence along `axis` over `window_s`, without the enable condition.
+    /// Returns the evidence along `axis` over `window_s`, without the enable condition and the servo's
+    /// response.
     fn axis_evidence(&self, moment: &Moment, axis: Axis, window_s: f64) -> AxisEvidence {
         let (fit, servo) = (self.acceleration_filter.fits[axis], &self.servos[axis]);
         let full = fit.filter(|f| {
@@ -472,7 +478,7 @@ impl Pipeline {
             nats: servo.nats(),
             path_nats: servo.path_nats(),
             path_limit_nats: self.evaluator.limits()[axis].path_nats,
-            answer: (self.settings.profile == Profile::Default).then(|| servo.answer()),
+            answer: None,
             identical_s: self.readings.axes[axis].identical_s,
         }
     }
@@ -507,7 +513,7 @@ impl Pipeline {
         self.since_jump_s < self.settings_of(FaultCode::Sensor).jump_lasts_s()
     }
 
-    fn surroundings(&self) -> Surroundings {
+    fn surroundings(&self, memory: &FaultMemory) -> Surroundings {
         Surroundings {
             clear_s: self.edge.clear_s,
             at_edge: self.edge.at_edge,
@@ -516,6 +522,10 @@ impl Pipeline {
             over_the_edge: self.edge.at_edge && self.edge.is_open(),
             jumped: self.jumped(),
             noisy_m: self.noisy_m,
+            has_broken_servo: Axis::ALL.iter().any(|&axis| {
+                let code = FaultCode::servo(axis);
+                memory.goes_on(code) && memory.record(code).status.failed_this_cycle()
+            }),
         }
     }
 
@@ -528,6 +538,7 @@ impl Pipeline {
         memory: &mut FaultMemory,
         transitions: &mut Vec<Transition>,
     ) {
+        let mut confirmed = [false; FaultCode::COUNT];
         let mut blamed = false;
         for (&code, finding) in FaultCode::ALL.iter().zip(findings) {
             let settings = &*self.trial.settings(code, &self.settings);
@@ -541,7 +552,9 @@ impl Pipeline {
                 true => qualified,
                 false => qualified.min(Qualified::Failed),
             };
+            let went_on = memory.goes_on(code);
             watch.apply(code, qualified, settings, &self.evidence, memory, transitions);
+            confirmed[code as usize] = !went_on && memory.goes_on(code);
             let failed = match qualified {
                 Qualified::Tripped => true,
                 // Evidence continues to accumulate until it confirms.
@@ -549,6 +562,16 @@ impl Pipeline {
                 Qualified::No | Qualified::Passed => false,
             };
             blamed |= failed && code.axis().is_none();
+        }
+        for (i, watch) in self.monitors.iter_mut().enumerate() {
+            let mut others = FaultCode::ALL.iter().filter(|code| **code as usize != i);
+            if others.clone().any(|code| confirmed[*code as usize]) {
+                watch.another_confirmed();
+            } else if findings[i].test == Test::NotTested
+                && others.any(|code| memory.goes_on(*code))
+            {
+                watch.could_not_judge(dt);
+            }
         }
         if blamed {
             // The blamed cause explains the earlier suspicion of the servos.
@@ -613,9 +636,11 @@ impl Pipeline {
         Thresholds { times, suspect_nats, confirm_nats }
     }
 
-    /// The result that the monitor of `code` can give so far.
+    /// The result that the monitor of `code` can give so far. While a fault of another monitor goes on,
+    /// it must have judged for as long again, and for most of that time: "no fault" is not said of a time
+    /// that nobody judged.
     fn reach(&self, code: FaultCode) -> Reach {
-        let judged_s = self.monitors[code as usize].judged_s();
+        let judged_s = self.monitors[code as usize].judged_since_s();
         match InUse::judges(judged_s, DebounceTimes::needed_s(code, &self.settings_of(code))) {
             false => Reach::NotJudged,
             true if !self.settings.confirms(code, None) => Reach::NotLearnt,

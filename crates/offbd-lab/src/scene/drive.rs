@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use nalgebra::{Vector2, Vector3};
 
-use super::law::Law;
+use super::law::{AngleNodes, Law};
 use offbd_core::maths::sine::sin_cos;
 use offbd_core::plant::{GRAVITY_M_S2, Motion, PlateMotion, Tilt};
 
@@ -45,13 +45,6 @@ pub trait Drive {
     /// Returns the shortest time scale of the plate's motion, s: a period or the duration
     /// of a step.
     fn shortest_time_s(&self) -> f64;
-}
-
-/// An angle at several times, rad, with its first and second derivatives.
-pub struct AngleNodes<const M: usize> {
-    pub angle: [f64; M],
-    pub rate: [f64; M],
-    pub acceleration: [f64; M],
 }
 
 /// The plate's motion in its own frame at several times, as [`PlateMotion`], each

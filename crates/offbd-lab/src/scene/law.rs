@@ -3,7 +3,6 @@
 
 use std::f64::consts::TAU;
 
-use super::drive::AngleNodes;
 use offbd_core::maths::sine::{self, sin_cos};
 use offbd_core::vocabulary::{Invalid, in_range, positive};
 
@@ -51,6 +50,13 @@ impl Term {
 pub struct Law {
     constant: f64,
     varying: Vec<Term>,
+}
+
+/// An angle at several times, rad, with its first and second derivatives.
+pub struct AngleNodes<const M: usize> {
+    pub angle: [f64; M],
+    pub rate: [f64; M],
+    pub acceleration: [f64; M],
 }
 
 impl Law {

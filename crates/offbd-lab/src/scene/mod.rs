@@ -22,10 +22,10 @@ mod survey;
 
 pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHORTEST_STEP_S};
 pub use controlled::{ControlLoop, ControlStep, ControlledPlate};
-pub use drive::{AngleNodes, Drive, Laws, PlateNodes, Push};
+pub use drive::{Drive, Laws, PlateNodes, Push};
 pub use events::{Event, MOST_EVENTS};
 pub use ladder::{Choice, OutOfReach, TriedCandidate, choose};
-pub use law::{Law, Term};
+pub use law::{AngleNodes, Law, Term};
 pub use one_pass::{Declined, OnePass, Stage, one_pass};
 pub use run::{RunOutcome, run, suits};
 pub use samples::{Samples, Sink};

@@ -8,7 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 pub use self::injections::{BallFault, SensorFault, ServoFault};
-pub(super) use self::injections::{HornDrive, SensorLook};
+pub(super) use self::injections::{HornDrive, Reading, SensorLook};
 use offbd_core::vocabulary::{Axis, FaultCode};
 
 /// The faulty component and its fault.

@@ -4,9 +4,26 @@ use super::ball::Surface;
 use super::controller::{ControllerModel, PidGains};
 use super::sensor::SensorModel;
 use super::servo::ServoTruth;
-use super::session::SessionSpread;
 use offbd_core::engine::Rig;
 use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
+
+/// Standard deviations between the sessions of one rig; immutable.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SessionSpread {
+    /// Standard deviation of the level of each axis, rad, 0 to 0.1. Observed on one real
+    /// rig: 1.1° within a day.
+    pub level_rad: f64,
+    /// Standard deviation of the gain of each axis as a share of it, 0 to 0.3.
+    pub gain: f64,
+}
+
+impl SessionSpread {
+    fn check(&self) -> Result<(), Invalid> {
+        in_range("/spread/level_rad", self.level_rad, 0.0..=0.1)?;
+        in_range("/spread/gain", self.gain, 0.0..=0.3)?;
+        Ok(())
+    }
+}
 
 /// A rig to be simulated; immutable.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,11 +7,10 @@ use std::str::FromStr;
 
 use super::ball::Surface;
 use super::controller::ControllerModel;
-use super::model::RigModel;
+use super::model::{RigModel, SessionSpread};
 use super::refresh::Refresh;
 use super::sensor::SensorModel;
 use super::servo::ServoTruth;
-use super::session::SessionSpread;
 use offbd_core::engine::{Rig, ServoSpec};
 use offbd_core::plant::{Ball, Plate, PlateShape};
 use offbd_core::vocabulary::{Invalid, PerAxis, UnknownWord};

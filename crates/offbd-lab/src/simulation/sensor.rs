@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector2;
 
-use super::fault::{SensorFault, SensorLook};
+use super::fault::{Reading, SensorFault, SensorLook};
 use super::noise::{Noise, Purpose};
 use super::refresh::Refresh;
 use super::steps::{rounded, step_in};
@@ -64,9 +64,6 @@ impl SensorModel {
         self.noise_m.max(self.quantum_m / 12.0_f64.sqrt()).max(1e-4)
     }
 }
-
-/// A reading, m per axis; `None` if no ball is seen.
-pub(super) type Reading = PerAxis<Option<f64>>;
 
 /// Range of the distance of a spike or outlier as a share of the reach; chosen.
 const OUTLIER_SHARE: [f64; 2] = [0.2, 0.9];

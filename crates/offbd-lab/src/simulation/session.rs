@@ -3,29 +3,11 @@
 
 use super::model::RigModel;
 use super::noise::{Noise, Purpose};
-use offbd_core::vocabulary::{Axis, Invalid, PerAxis, in_range};
-
-/// Standard deviations between the sessions of one rig; immutable.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SessionSpread {
-    /// Standard deviation of the level of each axis, rad, 0 to 0.1. Observed on one real
-    /// rig: 1.1° within a day.
-    pub level_rad: f64,
-    /// Standard deviation of the gain of each axis as a share of it, 0 to 0.3.
-    pub gain: f64,
-}
+use offbd_core::vocabulary::{Axis, PerAxis};
 
 /// Limit of a session's deviation from its rig, in standard deviations. Chosen so that a
 /// controller can balance the ball in every session.
 const FARTHEST: f64 = 3.0;
-
-impl SessionSpread {
-    pub(super) fn check(&self) -> Result<(), Invalid> {
-        in_range("/spread/level_rad", self.level_rad, 0.0..=0.1)?;
-        in_range("/spread/gain", self.gain, 0.0..=0.3)?;
-        Ok(())
-    }
-}
 
 impl RigModel {
     /// Returns this rig in the session of `seed`: levels and gains are drawn around its
@@ -55,6 +37,7 @@ impl RigModel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::model::SessionSpread;
     use super::*;
     use crate::simulation::Preset;
     use proptest::prelude::*;

@@ -8,9 +8,8 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector2;
 
-use super::fault::{Fault, FaultEffect};
+use super::fault::{Fault, FaultEffect, Reading};
 use super::model::RigModel;
-use super::sensor::Reading;
 use offbd_core::vocabulary::{Axis, PerAxis};
 
 /// The true state of the rig at one time, known to the simulation alone.

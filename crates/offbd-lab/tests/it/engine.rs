@@ -116,6 +116,81 @@ fn a_repaired_servo_passes_whenever_it_broke() {
     }
 }
 
+/// A servo that breaks at the beginning of a session may be confirmed by the duration of its residual,
+/// before there is much evidence: what kinds it may be is known all the same.
+#[test]
+fn a_confirmed_servo_has_kinds() {
+    let (setup, mut n_confirmed) = (learnt(Preset::Chapter), 0);
+    for (seed, onset_s) in (1..).zip([1.0, 1.0, 1.0, 2.0, 2.0, 3.0]) {
+        for kind in ["dead", "hold", "reversed"] {
+            let fault = format!("y_servo:{kind}@{onset_s}");
+            let samples = session(Preset::Chapter, Reference::Steps, 30.0, seed, &fault);
+            let found = transitions(&setup, &samples);
+            let confirmed = |t: &&Transition| t.status == FaultStatus::Confirmed;
+            let of_servo = found.iter().filter(|t| t.code == FaultCode::YServo).find(confirmed);
+            let Some(first) = of_servo else { continue };
+            n_confirmed += 1;
+            let suspicion = &first.suspicion;
+            assert!(
+                !suspicion.candidates.is_empty() || suspicion.kind.is_some(),
+                "{seed} {fault} {first:?}"
+            );
+        }
+    }
+    assert!(n_confirmed >= 9, "{n_confirmed} of 18");
+}
+
+/// A ball that rolls slowly and answers neither servo is not stuck.
+#[test]
+fn a_supply_that_fails_is_not_a_stuck_ball() {
+    let mut n_found = 0;
+    for preset in [Preset::Chapter, Preset::Pingpong] {
+        let setup = learnt(preset);
+        for (seed, reference) in
+            (1..).zip([Reference::Steps, Reference::Circle, Reference::Lissajous])
+        {
+            let model = preset.model().unwrap();
+            let mut rig = SimulatedRig::new(model, reference, LIVELY, seed).unwrap();
+            for fault in ["x_servo:dead@20", "y_servo:dead@20"] {
+                rig.inject(fault.parse().unwrap());
+            }
+            let rows = std::iter::from_fn(|| Some(rig.next_sample()));
+            let samples: Vec<_> = rows.take_while(|s| s.t_s < 60.0).collect();
+            let found = confirmed(&transitions(&setup, &samples));
+            let servo = |(code, _): &(FaultCode, f64)| code.axis().is_some();
+            assert!(found.iter().all(servo), "{preset} {reference:?}: {found:?}");
+            n_found += usize::from(!found.is_empty());
+        }
+    }
+    assert!(n_found >= 3, "{n_found} of 6");
+}
+
+/// A rim does not turn a ball that lies at it: where the readings of such a ball step, they have
+/// jumped.
+#[test]
+fn readings_of_a_ball_at_the_rim_jump() {
+    let setup = learnt(Preset::Chapter);
+    let mut n_at_rim = 0;
+    for seed in 1..7 {
+        let fault = "x_servo:dead@5";
+        let mut samples = session(Preset::Chapter, Reference::Steps, 60.0, seed, fault);
+        let rests =
+            |s: &Sample| (39.0..40.0).contains(&s.t_s) && s.x_m.is_some_and(|x| x.abs() > 0.17);
+        n_at_rim += i32::from(samples.iter().filter(|s| rests(s)).count() > 20);
+        // The controller gives up, which does not matter to a dead servo.
+        for sample in samples.iter_mut().filter(|s| s.t_s >= 30.0) {
+            sample.cmd_qy_rad = Some(0.0);
+        }
+        for sample in samples.iter_mut().filter(|s| s.t_s >= 40.0) {
+            sample.x_m = sample.x_m.map(|x| x - 0.04 * x.signum());
+        }
+        let found = confirmed(&transitions(&setup, &samples));
+        let codes: Vec<_> = found.iter().map(|&(code, _)| code).collect();
+        assert_eq!(codes, [FaultCode::XServo, FaultCode::Sensor], "{seed}: {found:?}");
+    }
+    assert!(n_at_rim >= 3, "{n_at_rim} of 6");
+}
+
 /// What a servo does after its repair does not tell what was broken.
 #[test]
 fn a_repair_does_not_change_the_kind() {

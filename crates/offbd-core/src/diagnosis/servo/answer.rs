@@ -56,8 +56,7 @@ pub struct ServoAnswer {
     pub delay_s: f64,
     pub delay_error_s: f64,
     /// Likelihoods of the kinds of fault in the order dead, held, reversed, gain, offset,
-    /// slow; they sum to one, or are all zero while there is hardly any evidence for a
-    /// fault.
+    /// slow; they sum to one, or are all zero while nothing speaks for a fault.
     pub likelihoods: [f64; KINDS],
 }
 

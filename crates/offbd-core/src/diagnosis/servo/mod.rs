@@ -91,8 +91,8 @@ const STEADY_S: f64 = 20.0;
 /// Least standard deviation of a block's mean, m: roughness of plate and touch panel.
 const ROUGHNESS_M: f64 = 1.4e-4;
 
-/// Evidence from which on the kind of fault is determined, nats. Chosen: well below what
-/// makes a servo suspected.
+/// Evidence from which on the kind of fault is determined from all that follows, nats. Chosen: well
+/// below what makes a servo suspected.
 const CLASSIFIED_NATS: f64 = 4.0;
 
 /// Allowance for the session's level, in standard errors. Chosen.
@@ -288,12 +288,12 @@ impl ServoFilterBank {
         if self.nats >= broken_nats && rises {
             self.healthy.set_parameters(&self.unaccused);
         }
-        self.stay(&step, y, variance);
+        self.stay(&step, (y, variance), healthy);
     }
 
     /// Follows a broken servo while there is evidence, from [`CLASSIFIED_NATS`] on.
     /// A repair ends the evidence of the path too.
-    fn stay(&mut self, step: &FilterStep, y: f64, variance: f64) {
+    fn stay(&mut self, step: &FilterStep, reading: (f64, f64), healthy: f64) {
         match &mut self.staying {
             Some(staying) if self.nats == 0.0 => {
                 if staying.most_nats() >= self.prior.broken_nats() {
@@ -301,9 +301,9 @@ impl ServoFilterBank {
                 }
                 self.staying = None;
             }
-            Some(staying) => staying.follow(step, y, variance, self.nats),
+            Some(staying) => staying.follow(step, reading, self.nats, healthy),
             None if self.nats >= CLASSIFIED_NATS => {
-                self.staying = Some(Box::new(StayingFault::new(y, variance)));
+                self.staying = Some(Box::new(StayingFault::new(reading)));
             }
             None => {}
         }
@@ -402,11 +402,16 @@ impl ServoFilterBank {
     }
 
     /// The response of the servo relative to the twin's: since there is evidence for a fault, or
-    /// the recent one.
+    /// the recent one, whose kinds are told if its monitor is `suspicious`: the residual may confirm a
+    /// fault before the evidence is enough to follow it.
     #[must_use]
-    pub fn answer(&self) -> ServoAnswer {
-        match &self.staying {
-            Some(staying) => staying.answer(),
+    pub fn answer(&self, suspicious: bool) -> ServoAnswer {
+        match self.staying.as_ref().and_then(|staying| staying.answer()) {
+            Some(answer) => answer,
+            None if suspicious => ServoAnswer {
+                likelihoods: answer::likelihoods(&self.faulty),
+                ..ServoAnswer::of(&self.faulty)
+            },
             None => ServoAnswer::of(&self.faulty),
         }
     }

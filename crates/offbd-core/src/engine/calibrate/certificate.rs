@@ -7,8 +7,7 @@
 //! in minutes; it is taken from a population of simulated rigs that were watched for
 //! hours (`offbd chart certificate` compares the result with other rigs).
 
-use super::proof::PATIENCE;
-use super::self_test::SelfTest;
+use super::self_test::{PATIENCE, SelfTest};
 use crate::diagnosis::{Calibration, MonitorCertificate, Settings};
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;

@@ -5,7 +5,7 @@
 //! friction holds it, is left out instead.
 
 use super::data::Data;
-use super::self_test::{Accusation, SelfTest, judge};
+use super::self_test::{Accusation, PATIENCE, SelfTest, judge};
 use super::widening::{STOOD_S, Widening};
 use super::{CannotCalibrate, GoOn, certificate, check, learn_untested};
 use crate::diagnosis::{AxisCalibration, Calibration, LeftOut, Settings};
@@ -16,9 +16,6 @@ use crate::vocabulary::{Axis, FaultCode, Sample};
 
 /// Most groups of sessions (folds); each costs a calibration. Chosen.
 const MOST_GROUPS: usize = 4;
-/// Factor on the times that confirm a fault, for the tests: no healthy session may fail
-/// for longer than this fraction. Chosen.
-pub(super) const PATIENCE: f64 = 0.6;
 /// Most rounds of widening. Chosen.
 const MOST_WIDENINGS: usize = 40;
 /// Duration from which on a session is judged by itself if its halves cannot be learnt,

@@ -25,6 +25,9 @@ fn a_ball_without_room_on_its_plate_is_named() {
     rig.ball = crate::plant::Ball::new(0.12, 0.051, 0.4).unwrap();
     let refused = refused(&rig, &[session(60.0, 0.03, 1.0)]);
     assert!(refused.contains("the ball, 0.12 m in radius, would touch the edge"), "{refused}");
+    // Also where the command explains the motion: at most positions such a ball could not be.
+    let at = |share| Misfit::NoRoom { share, radius_m: 0.09 };
+    assert!(at(0.76).prevents_learning() && !at(0.4).prevents_learning());
 }
 
 #[test]

@@ -9,6 +9,9 @@ use crate::diagnosis::{Evidence, FaultMemory, Transition};
 use crate::engine::{Engine, Input, Setup};
 use crate::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, PerAxis, Sample};
 
+/// Factor on the times that confirm a fault, for the tests: no healthy session may fail
+/// for longer than this fraction. Chosen.
+pub(super) const PATIENCE: f64 = 0.6;
 /// Time for which scatter must persist to count, s. Chosen.
 const LASTING_S: f64 = 0.2;
 

@@ -230,7 +230,7 @@ impl Misfit {
                 | Self::Positions { .. }
                 | Self::Commands { .. }
                 | Self::CommandsHeld
-        )
+        ) || matches!(self, Self::NoRoom { share, .. } if share > MAJORITY)
     }
 }
 

@@ -7,7 +7,6 @@
 use nalgebra::Vector2;
 
 use super::size::{Number, OneAxis, Shift, Size as _, factor, number, share};
-use crate::simulation::sensor::Reading;
 use crate::simulation::steps::rounded;
 use offbd_core::vocabulary::{Axis, PerAxis};
 
@@ -161,6 +160,9 @@ impl ServoFault {
         }
     }
 }
+
+/// A reading, m per axis; `None` if no ball is seen.
+pub(in crate::simulation) type Reading = PerAxis<Option<f64>>;
 
 /// One look of the sensor, with the random numbers of all faults.
 pub(in crate::simulation) struct SensorLook {

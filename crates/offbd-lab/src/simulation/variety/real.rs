@@ -3,12 +3,11 @@
 
 use super::super::ball::Surface;
 use super::super::controller::ControllerModel;
-use super::super::model::RigModel;
+use super::super::model::{RigModel, SessionSpread};
 use super::super::noise::Noise;
 use super::super::refresh::Refresh;
 use super::super::sensor::SensorModel;
 use super::super::servo::ServoTruth;
-use super::super::session::SessionSpread;
 use super::ranges::{self, KINDS, RigKind, by_factor, even};
 use offbd_core::engine::{Rig, ServoSpec};
 use offbd_core::plant::{Ball, Plate, PlateShape};
