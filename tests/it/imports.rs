@@ -164,7 +164,7 @@ async fn an_import_without_its_client_ends_and_leaves_nothing() {
 /// An archive in whose list 16 parts share the bytes of one with 30 MiB.
 fn overlapping() -> Vec<u8> {
     let gap = "<row/>".to_owned() + &" ".repeat(1000);
-    let one = archive(&[("part-@", gap.repeat((30 << 20) / gap.len()).as_bytes())]);
+    let one = archive(&[("xl/pa@", gap.repeat((30 << 20) / gap.len()).as_bytes())]);
     let end = one.len() - 22;
     let start = u32::from_le_bytes(one[end + 16..end + 20].try_into().unwrap()) as usize;
     let mut file = one[..start].to_vec();
@@ -192,6 +192,31 @@ fn styles(n: usize, length: usize) -> String {
 /// A list of `n` empty texts that states another number of them.
 fn texts(n: usize, stated: u64) -> String {
     format!(r#"<sst uniqueCount="{stated}">{}</sst>"#, "<si/>".repeat(n))
+}
+
+#[tokio::test]
+async fn a_file_without_a_usable_row_is_not_a_session() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("live"), &rig(100, 100)).await;
+    let head = "t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n";
+    let rows = |row: &str| format!("{head}{}", row.repeat(5000)).into_bytes();
+    for (file, reason) in [
+        (head.as_bytes().to_vec(), "no usable row"),
+        (rows("x,0,0,0,0\n"), "no usable row: line 2: `t_s`: `x` is not a number"),
+        (rows("0,0,0,0\n"), "no usable row: line 2: no field `y_m`"),
+    ] {
+        let problem = imported(client, CSV, file).await.problem(400);
+        assert!(problem["detail"].as_str().unwrap().starts_with(reason), "{problem}");
+        let sessions = client.get("sessions").await.expect(200);
+        assert_eq!(sessions["items"][0]["state"], "open", "{reason}: {sessions}");
+        assert_eq!(n_sessions(client).await, 1, "{reason}");
+    }
+    // What only the rig's limits reject.
+    let problem = imported(client, CSV, rows("0,0,0,1e3,0\n")).await.problem(400);
+    assert_eq!(problem["detail"], "no usable row: x_m is 1000, beyond ±50");
+    assert_eq!(n_sessions(client).await, 1);
 }
 
 #[tokio::test]
@@ -258,7 +283,7 @@ async fn a_short_workbook_takes_no_gigabytes_of_memory() {
     for (file, status) in [
         (with(&one_row, TEXTS, &texts), 201),
         (with(&one_row, STYLES, &styles), 201),
-        (with(&quoting, TEXTS, &text), 201),
+        (with(&quoting, TEXTS, &text), 400),
         (with(&naming, TEXTS, &text), 400),
     ] {
         assert!(file.len() < 100_000, "{}", file.len());

@@ -65,6 +65,15 @@ fn plain(_: usize, value: Option<f64>) -> String {
     value.map_or(String::new(), |value| value.to_string())
 }
 
+/// A data frame as R's `write.table` writes it: no name stands above the numbers of the rows.
+fn named_rows(rows: &[[Option<f64>; 5]]) -> String {
+    let quoted = |name: &str| format!("\"{name}\"");
+    let names: Vec<String> = HEADER.split(',').map(quoted).collect();
+    let text = table("", rows, " ", |_, value| value.map_or("NA".to_owned(), |v| v.to_string()));
+    let numbered = text.lines().enumerate().map(|(i, row)| format!("\"{}\" {row}\n", i + 1));
+    names.join(" ") + "\n" + &numbered.collect::<String>()
+}
+
 /// The same recording in the layouts of many programs.
 fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
     let semicolons = HEADER.replace(',', ";");
@@ -122,6 +131,7 @@ fn files(rows: &[[Option<f64>; 5]]) -> Vec<OddFile> {
             }),
             "",
         ),
+        file("names of rows", named_rows(rows), ""),
         file("units", format!("{HEADER}\ns,rad,rad,m,m\n{}", table("", rows, ",", plain)), ""),
         file(
             "own names",

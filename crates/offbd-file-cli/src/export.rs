@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 
 use crate::judge::{self, TableArgs};
+use crate::recordings;
 use offbd_core::engine::Setup;
 use offbd_core::vocabulary::Sample;
 use offbd_terminal::errors::{BadArgument, InputError};
@@ -154,7 +155,7 @@ fn info(
     table: &TableOptions,
     setup: Option<&Setup>,
 ) -> anyhow::Result<SessionInfo> {
-    let session = judge::session_name(&args.session);
+    let session = recordings::session_name(&args.session);
     let Some(setup) = setup else {
         return Ok(SessionInfo { session, ..SessionInfo::default() });
     };
@@ -174,12 +175,12 @@ fn info(
 
 /// The time of the first valid row, s.
 fn first_t_s((path, table): (&Path, &TableOptions)) -> Result<Option<f64>, InputError> {
-    let mut samples = judge::open(path, table)?.filter_map(Result::ok);
+    let mut samples = recordings::open(path, table)?.filter_map(Result::ok);
     Ok(samples.next().map(|sample| sample.t_s))
 }
 
 fn has_seq((path, table): (&Path, &TableOptions)) -> Result<bool, InputError> {
-    let mut rows = judge::open(path, table)?;
+    let mut rows = recordings::open(path, table)?;
     Ok(rows.any(|row| row.is_ok_and(|sample| sample.seq.is_some())))
 }
 
@@ -191,7 +192,7 @@ fn write(
 ) -> anyhow::Result<()> {
     out.write_all(&start)?;
     let (mut samples, mut n_rejected) = (Vec::<Sample>::with_capacity(BATCH), 0_usize);
-    for row in judge::open(path, table)? {
+    for row in recordings::open(path, table)? {
         match row {
             Ok(sample) => samples.push(sample),
             Err(SessionRowError::Rejected(reason)) => {

@@ -10,7 +10,7 @@ use crate::judge::{self, TableArgs};
 use offbd_terminal::errors::InputError;
 use offbd_terminal::output::{self, OutputFormat};
 use offbd_terminal::table;
-use offbd_wire::table::{
+use offbd_wire::inspection::{
     InspectedQuantityView, InspectionRemarkView, InspectionView, MappingChangeView, inspect,
 };
 
@@ -72,10 +72,18 @@ fn write_text(
             writeln!(out, "      {quantity}={expression}")?;
         }
     }
+    let has_time = view.quantities.iter().any(|q| q.quantity == "t_s" && q.expression.is_some());
+    let lacks_time = !has_time && args.table.options().rate_hz.is_none();
     if view.rows == 0 {
         let example = "--columns \"t_s=#1/ms, cmd_qy_rad=#2/deg, x_m=#3*0.0001-0.2\"";
         writeln!(out, "\nSay which column is what, for example with {example},")?;
         writeln!(out, "and the rate with --rate if no column has the time.")?;
+    } else if view.mapping.is_empty() && lacks_time {
+        writeln!(
+            out,
+            "\nIts columns have the names of the quantities, but for the time: give the rate with"
+        )?;
+        writeln!(out, "the file, such as --rate 50.")?;
     } else if view.mapping.is_empty() {
         writeln!(out, "\nIts columns have the names of the quantities; no mapping is needed.")?;
     } else {

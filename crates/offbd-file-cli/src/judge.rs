@@ -1,7 +1,6 @@
 //! Judges one session file. Used by `replay`, `trends` and `score`. The service judges in
 //! the same way, sample by sample.
 
-use std::fs::File;
 use std::path::Path;
 
 use crate::recordings::Recording;
@@ -14,7 +13,7 @@ use offbd_core::engine::{Rig, Setup};
 use offbd_core::vocabulary::Sample;
 use offbd_wire::asset;
 use offbd_wire::judging::{RecordedSession, run_name};
-use offbd_wire::session_file::{self, SessionRowError, SessionRows};
+use offbd_wire::session_file::SessionRowError;
 use offbd_wire::table::{ColumnMapping, RATES_HZ, TableOptions};
 
 /// How the tables of recordings in text are read.
@@ -54,11 +53,6 @@ pub fn load_rig(path: Option<&Path>) -> Result<Rig, InputError> {
 pub fn set_up(rig: Rig, profile: Option<Profile>) -> Result<Setup, InputError> {
     let name = rig.name.clone();
     Setup::new(rig, profile).map_err(|e| InputError::new(name, e))
-}
-
-/// The name of a session: that of its file.
-pub fn session_name(path: &Path) -> String {
-    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
 /// Judges each run of the session file at `path` as a session; there is at least one.
@@ -114,10 +108,4 @@ pub fn read_samples(
         }
     }
     Ok((runs, bad_rows))
-}
-
-/// Opens the session file at `path`, whatever its format.
-pub fn open(path: &Path, options: &TableOptions) -> Result<Box<dyn SessionRows>, InputError> {
-    let file = File::open(path).map_err(|e| InputError::file(path, e))?;
-    session_file::open(file, None, options).map_err(|e| InputError::file(path, e))
 }

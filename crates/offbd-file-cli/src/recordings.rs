@@ -1,13 +1,13 @@
 //! The recordings that a command gets: files, folders of files, and files that are parts of one
 //! recording.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::judge::{open, session_name};
 use offbd_terminal::errors::InputError;
-use offbd_wire::session_file::{JoinedRows, SessionRowError, SessionRows};
+use offbd_wire::session_file::{self, JoinedRows, SessionRowError, SessionRows};
 use offbd_wire::table::TableOptions;
 
 /// Whether the files are one recording.
@@ -87,6 +87,17 @@ impl JoinArgs {
         }
         Ok(files.iter().map(|file| Recording::of(file)).collect())
     }
+}
+
+/// The name of a session: that of its file.
+pub fn session_name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// Opens the session file at `path`, whatever its format.
+pub fn open(path: &Path, options: &TableOptions) -> Result<Box<dyn SessionRows>, InputError> {
+    let file = File::open(path).map_err(|e| InputError::file(path, e))?;
+    session_file::open(file, None, options).map_err(|e| InputError::file(path, e))
 }
 
 /// Returns the files in a folder, except hidden ones, by their names.

@@ -47,7 +47,7 @@ def test_what_a_notebook_shows_is_escaped_and_short(folder: Path) -> None:
     name = "<script>alert('&')</script>"
     healthy = offbd.replay(folder / "healthy.csv", folder / "calibrated.json", session=name)
     shown = ET.fromstring(healthy._repr_html_())
-    assert shown.text is not None and f"{name}: no fault confirmed" in shown.text
+    assert shown.text is not None and f"{name}: no confirmed fault" in shown.text
     sick = offbd.replay(folder / "sick.csv", folder / "calibrated.json", session=name)
     odd = {**sick.faults[0], "summary": '"<b>', "kind": "<i>"}
     many = replace(sick, faults=[odd] * 30)  # type: ignore[list-item]

@@ -81,8 +81,9 @@ pub fn coloured(text: &str, look: Look) -> String {
 }
 
 fn marked(text: &str, look: Look) -> String {
-    let words = text.split(' ').map(|word| format!("{}{word}", look.mark()));
-    words.collect::<Vec<_>>().join(" ")
+    let marked = |word: &str| format!("{}{word}", look.mark());
+    let line = |line: &str| line.split(' ').map(marked).collect::<Vec<_>>().join(" ");
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
 }
 
 /// A line with the colour of the marks in it, from the first one on.

@@ -163,7 +163,7 @@ impl Judging {
     pub fn summary(&self, session: &str, n_rejected: u64) -> SummaryView {
         self.verdict
             .summary(session, self.n_samples, n_rejected, self.engine.duration_s())
-            .with_monitors(self.verdict.monitors(&self.engine.state()))
+            .with_monitors(self.verdict.monitors(&self.engine.state(), self.engine.memory()))
             .with_misfits(&self.misfits())
             .with_residual(self.residual.rms_m_s2())
     }

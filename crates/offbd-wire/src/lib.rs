@@ -28,6 +28,8 @@ pub mod difference;
 pub mod drive_cycle;
 mod fault_kind;
 pub mod fmu;
+pub mod foreign_file;
+pub mod inspection;
 pub mod json;
 pub mod judging;
 pub mod learning;

@@ -18,6 +18,8 @@ mod line;
 #[cfg(feature = "mcap")]
 mod mcap;
 #[cfg(feature = "mcap")]
+mod mcap_file;
+#[cfg(feature = "mcap")]
 mod mcap_rows;
 #[cfg(feature = "mcap")]
 mod mcap_scene;
@@ -43,6 +45,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use offbd_core::vocabulary::Sample;
 use serde::{Deserialize, Serialize};
 
+use super::foreign_file::{ForeignFileError, HEAD_BYTES, check_own};
 use super::session_csv;
 use super::table::{CsvError, NamedColumns, RowError, TableOptions, TableReader};
 use super::telemetry::sample_view;
@@ -163,45 +166,6 @@ fn is_json(head: &[u8]) -> bool {
 /// The first bytes of an Arrow file, which is a stream between signatures.
 const ARROW_FILE: &[u8] = b"ARROW1\0\0";
 
-/// Bytes that show the format of a file.
-pub(crate) const HEAD_BYTES: u64 = 128;
-
-/// What files begin with that are not recordings, what they are, and what to do with them.
-const FOREIGN: [(&[u8], &str, &str); 9] = [
-    (b"\xd0\xcf\x11\xe0", "an old Excel workbook", AS_XLSX),
-    (b"MATLAB 5.0 MAT-file", "a MATLAB file", AS_CSV),
-    (b"\x89HDF\r\n", "an HDF5 or MATLAB file", AS_CSV),
-    (b"\x1f\x8b", "a gzip file", "unpack it first"),
-    (b"7z\xbc\xaf", "a 7-Zip file", "unpack it first"),
-    (b"SQLite format 3\0", "an SQLite database", "restore it with `offbd restore`, or export CSV"),
-    (b"\x89PNG\r\n", "a picture", AS_RECORDING),
-    (b"\xff\xd8\xff", "a picture", AS_RECORDING),
-    (b"%PDF-", "a PDF document", AS_RECORDING),
-];
-
-/// What an OpenDocument file has within its first bytes.
-const OPEN_DOCUMENT: &[u8] = b"mimetypeapplication/vnd.oasis.opendocument";
-
-const AS_XLSX: &str = "save it as .xlsx or as CSV in the spreadsheet program";
-const AS_CSV: &str = "write it as CSV, with the columns t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m";
-const AS_RECORDING: &str = "a recording is a table of times, commands and positions";
-
-/// Checks that a file that begins with `head` is not one of another program.
-///
-/// # Errors
-/// [`SessionFileError::Foreign`].
-pub(crate) fn check_own(head: &[u8]) -> Result<(), SessionFileError> {
-    let open_document = || {
-        let is_here = head.windows(OPEN_DOCUMENT.len()).any(|bytes| bytes == OPEN_DOCUMENT);
-        is_here.then_some(("an OpenDocument file", AS_XLSX))
-    };
-    let found = FOREIGN.iter().find(|(signature, ..)| head.starts_with(signature));
-    match found.map(|(_, what, advice)| (*what, *advice)).or_else(open_document) {
-        Some((what, advice)) => Err(SessionFileError::Foreign { what, advice }),
-        None => Ok(()),
-    }
-}
-
 /// Why a file cannot be read or written as a session.
 #[derive(Debug, thiserror::Error)]
 pub enum SessionFileError {
@@ -211,9 +175,8 @@ pub enum SessionFileError {
         "this build of offbd has no {format}; build it with `cargo build --features {feature}`"
     )]
     NotBuilt { format: SessionFormat, feature: &'static str },
-    /// A file of another program.
-    #[error("this is {what}, not a recording; {advice}")]
-    Foreign { what: &'static str, advice: &'static str },
+    #[error(transparent)]
+    Foreign(#[from] ForeignFileError),
     #[error("{0} files are only read, not written")]
     NotWritten(SessionFormat),
     /// The column is not numeric; `found` is its type.
@@ -336,11 +299,13 @@ pub fn open<S: Read + Seek + Send + 'static>(
     options: &TableOptions,
 ) -> Result<Box<dyn SessionRows>, SessionFileError> {
     let mut head = Vec::new();
-    if format.is_none() {
-        source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
-        check_own(&head)?;
-    }
-    let format = format.unwrap_or_else(|| SessionFormat::of(&head));
+    source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
+    check_own(&head)?;
+    // Programs declare any file as a text; a signature says more.
+    let format = match SessionFormat::of(&head) {
+        SessionFormat::Csv => format.unwrap_or(SessionFormat::Csv),
+        found => found,
+    };
     if format == SessionFormat::Csv {
         // A pipe cannot go back to its start.
         let source = io::Cursor::new(head).chain(source);
@@ -406,7 +371,7 @@ pub(crate) trait ColumnFile {
 /// The rows of a text, or of another file that is read as one.
 pub(crate) struct TextRows<'a> {
     kind: TextKind,
-    rows: TableReader<'a>,
+    rows: TableReader<'a, SessionFileError>,
 }
 
 impl<'a> TextRows<'a> {
@@ -419,7 +384,7 @@ impl<'a> TextRows<'a> {
         source: impl Read + Send + 'a,
         options: &TableOptions,
     ) -> Result<Self, SessionFileError> {
-        match (TableReader::recording(source, options), kind) {
+        match (TableReader::of_text(source, options), kind) {
             (Ok(rows), kind) => Ok(Self { kind, rows }),
             (Err(error), TextKind::Sheet(sheet)) => {
                 Err(SessionFileError::Sheet { sheet, reason: error.to_string() })
@@ -429,7 +394,7 @@ impl<'a> TextRows<'a> {
     }
 
     /// Reads a table with names and types.
-    const fn of_columns(rows: TableReader<'a>) -> Self {
+    const fn of_columns(rows: TableReader<'a, SessionFileError>) -> Self {
         Self { kind: TextKind::Rows { n_before: 0 }, rows }
     }
 
@@ -622,28 +587,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_of_other_programs_are_named() {
-        let open_document =
-            [&b"PK\x03\x04\x14"[..], &[0; 25], OPEN_DOCUMENT, b".spreadsheet"].concat();
-        for (head, what) in [
-            (
-                &b"\xd0\xcf\x11\xe0\xa1\xb1"[..],
-                "an old Excel workbook, not a recording; save it as",
-            ),
-            (&open_document, "an OpenDocument file"),
-            (b"\x89HDF\r\n\x1a\n", "an HDF5 or MATLAB file, not a recording; write it as CSV"),
-            (b"MATLAB 5.0 MAT-file, Platform", "a MATLAB file"),
-            (b"\x1f\x8b\x08", "a gzip file, not a recording; unpack it first"),
-            (b"\x89PNG\r\n\x1a\n", "a picture"),
-        ] {
-            let error = check_own(head).unwrap_err().to_string();
-            assert!(error.starts_with(&format!("this is {what}")), "{error}");
-        }
-        for own in
-            [&b"t_s,x_m\n"[..], b"", b"PK\x03\x04", b"PAR1", b"\x89MCAP0\r\n", b"\xff\xfet\0"]
-        {
-            assert!(check_own(own).is_ok(), "{own:?}");
-        }
+    fn json_and_csv_are_told_apart() {
         for (head, format) in [
             (&b"\n [{\"t_s\": 0}]"[..], SessionFormat::Json),
             (b"{\"t_s\": [0]}", SessionFormat::Json),
@@ -652,5 +596,23 @@ mod tests {
         ] {
             assert_eq!(SessionFormat::of(head), format, "{head:?}");
         }
+    }
+
+    #[test]
+    fn files_of_other_programs_are_named_whatever_they_are_declared_to_be() {
+        let zip = [&b"PK\x03\x04"[..], &[0; 26], b"log.csv"].concat();
+        for (bytes, told) in
+            [(b"\x1f\x8b\x08 gzip".to_vec(), "a gzip file"), (zip.clone(), "a zip file")]
+        {
+            let options = TableOptions::default();
+            let error =
+                open(io::Cursor::new(bytes.clone()), Some(SessionFormat::Csv), &options).err();
+            assert!(error.unwrap().to_string().contains(told), "{told}");
+            let error = crate::telemetry::csv(&bytes, &options, 10).unwrap_err();
+            assert!(error.to_string().contains(told), "{error}");
+        }
+        let list = br#"[{"t_s":0,"cmd_qy_rad":0,"x_m":0.1}]"#;
+        let rows = open(io::Cursor::new(list), Some(SessionFormat::Csv), &TableOptions::default());
+        assert_eq!(rows.unwrap().count(), 1);
     }
 }

@@ -13,28 +13,25 @@ mod columns;
 mod dialect;
 mod encoding;
 mod expression;
-mod guess;
-mod inspection;
-mod motion;
+pub(crate) mod guess;
+mod own_names;
 mod rows;
+mod unit;
 
 use std::io::{self, Cursor, Read};
 
+pub(crate) use self::cell::DecimalSign;
 pub use self::clock::starts_again;
+pub(crate) use self::columns::{AXES, Axis};
+pub(crate) use self::dialect::{Dialect, JUDGED_ROWS, NamedColumns};
+pub(crate) use self::expression::Dimension;
 pub use self::expression::{ColumnMapping, ColumnName, Expression, MappingError, Term};
 pub(crate) use self::guess::nearest_of;
-pub use self::inspection::{
-    InspectedColumnView, InspectedMotionView, InspectedQuantityView, InspectionRemarkView,
-    InspectionView, MappingChangeView, inspect,
-};
+pub(crate) use self::rows::{Cells, RowFault, RowSource};
 
 use self::clock::RowClock;
 use self::columns::BoundMapping;
-use self::dialect::Dialect;
-pub(crate) use self::dialect::{JUDGED_ROWS, NamedColumns};
-use self::rows::Rows;
-pub(crate) use self::rows::{Cells, RowFault, RowSource};
-use crate::session_file::SessionFileError;
+use self::rows::{RowLayout, Rows};
 use offbd_core::vocabulary::{Brief, Sample};
 
 /// The rates that a table without a time may have, rows a second. Chosen: from a row in a quarter of
@@ -62,7 +59,7 @@ impl TableOptions {
     }
 
     /// Returns the options for a table.
-    fn of_table(&self, dialect: &Dialect) -> Self {
+    pub(crate) fn of_table(&self, dialect: &Dialect) -> Self {
         let mut own = self.clone();
         if own.columns.is_empty() && columns::has_all(dialect, &own.of_rig) {
             own.columns = std::mem::take(&mut own.of_rig);
@@ -86,8 +83,17 @@ pub enum CsvError {
         /// A sentence that proposes a mapping, or nothing.
         proposal: String,
     },
-    #[error("the header names the column `{0}` twice")]
-    DoubleColumn(&'static str),
+    #[error(
+        "the header names the column `{name}` twice; map one: `{name}=#{first}` or `{name}=#{second}`"
+    )]
+    DoubleColumn {
+        name: &'static str,
+        /// The numbers of the two, from 1.
+        first: usize,
+        second: usize,
+    },
+    #[error("the file is empty")]
+    Empty,
     #[error(transparent)]
     Mapping(#[from] MappingError),
     /// The times are probably in another unit.
@@ -110,9 +116,9 @@ pub struct RowError {
 }
 
 /// A text whose table has been found.
-struct OpenedTable<'a> {
-    dialect: Dialect,
-    encoding: &'static str,
+pub(crate) struct OpenedTable<'a> {
+    pub(crate) dialect: Dialect,
+    pub(crate) encoding: &'static str,
     /// The rows, behind the header.
     rows: Box<dyn Read + Send + 'a>,
 }
@@ -121,7 +127,9 @@ struct OpenedTable<'a> {
 ///
 /// # Errors
 /// [`CsvError::NoTable`]; [`CsvError::Header`] if `source` cannot be read.
-fn find_table<'a>(mut source: impl Read + Send + 'a) -> Result<OpenedTable<'a>, CsvError> {
+pub(crate) fn find_table<'a>(
+    mut source: impl Read + Send + 'a,
+) -> Result<OpenedTable<'a>, CsvError> {
     let mut raw = Vec::new();
     source.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut raw)?;
     let (encoding, mark) = encoding::detect(&raw);
@@ -134,7 +142,9 @@ fn find_table<'a>(mut source: impl Read + Send + 'a) -> Result<OpenedTable<'a>, 
     let mut head = Vec::new();
     text.by_ref().take(dialect::HEAD_BYTES as u64).read_to_end(&mut head)?;
     let is_whole = head.len() < dialect::HEAD_BYTES;
-    let dialect = dialect::detect(&head, is_whole).ok_or(CsvError::NoTable)?;
+    let is_empty = is_whole && cell::bare(&head).is_empty();
+    let none = if is_empty { CsvError::Empty } else { CsvError::NoTable };
+    let dialect = dialect::detect(&head, is_whole).ok_or(none)?;
     head.drain(..dialect.n_bytes);
     Ok(OpenedTable {
         dialect,
@@ -149,11 +159,11 @@ fn check_time_unit(dialect: &Dialect, options: &TableOptions) -> Result<(), CsvE
     guess::wrong_time_unit(dialect).filter(|_| is_named).map_or(Ok(()), Err)
 }
 
-/// Reads samples row by row, in the order of the file.
-pub struct TableReader<'a> {
-    rows: Box<dyn RowSource + 'a>,
+/// Reads samples row by row, in the order of the file, which fails with `E`.
+pub struct TableReader<'a, E = io::Error> {
+    rows: Box<dyn RowSource<E> + 'a>,
     /// Why the rest of the file cannot be read.
-    fault: Option<SessionFileError>,
+    fault: Option<E>,
     dialect: Dialect,
     mapping: BoundMapping,
     clock: RowClock,
@@ -171,13 +181,6 @@ impl<'a> TableReader<'a> {
         Self::new(table, options, false)
     }
 
-    /// The names of the columns that are not read; none where a mapping says which are.
-    pub fn unread(&self) -> impl Iterator<Item = &str> {
-        let read = self.mapping.columns();
-        let names = self.dialect.names.iter().enumerate().filter(|_| !self.mapping.is_given);
-        names.filter(move |(i, _)| !read.contains(i)).map(|(_, name)| name.as_str())
-    }
-
     /// Opens a recording. A counter that wraps goes on; a clock that starts again, and a second
     /// header, begin another [run](Self::n_runs).
     ///
@@ -188,27 +191,23 @@ impl<'a> TableReader<'a> {
         source: impl Read + Send + 'a,
         options: &TableOptions,
     ) -> Result<Self, CsvError> {
+        Self::of_text(source, options)
+    }
+}
+
+impl<'a, E: From<io::Error>> TableReader<'a, E> {
+    /// As [`TableReader::recording`], for any error of the file.
+    ///
+    /// # Errors
+    /// As of [`TableReader::recording`].
+    pub(crate) fn of_text(
+        source: impl Read + Send + 'a,
+        options: &TableOptions,
+    ) -> Result<Self, CsvError> {
         let table = find_table(source)?;
         let options = &options.of_table(&table.dialect);
         check_time_unit(&table.dialect, options)?;
         Self::new(table, options, true)
-    }
-
-    /// Opens a recording that is not a text; `rows` opens its rows, of which these columns are read.
-    ///
-    /// # Errors
-    /// As of [`Self::recording`], and those of `rows`.
-    pub(crate) fn of_columns<R: RowSource + 'a>(
-        columns: &NamedColumns,
-        options: &TableOptions,
-        rows: impl FnOnce(&[usize]) -> Result<R, SessionFileError>,
-    ) -> Result<Self, SessionFileError> {
-        let dialect = Dialect::of_columns(columns);
-        let options = &options.of_table(&dialect);
-        check_time_unit(&dialect, options)?;
-        let mapping = BoundMapping::new(&dialect, options)?;
-        let rows = Box::new(rows(&mapping.columns())?);
-        Ok(Self::of(rows, dialect, mapping, true))
     }
 
     fn new(
@@ -218,12 +217,44 @@ impl<'a> TableReader<'a> {
     ) -> Result<Self, CsvError> {
         let OpenedTable { dialect, rows, .. } = table;
         let mapping = BoundMapping::new(&dialect, options)?;
-        let rows = Rows::new(rows, dialect.separator, dialect.comment, dialect.n_lines);
+        let layout = RowLayout {
+            separator: dialect.separator,
+            comment: dialect.comment,
+            n_cells: if dialect.names.is_empty() {
+                dialect.n_columns()
+            } else {
+                dialect.names.len()
+            },
+            may_have_more: dialect.ends_with_words(),
+        };
+        let rows = Rows::new(rows, layout, dialect.n_lines);
         Ok(Self::of(Box::new(rows), dialect, mapping, is_recording))
+    }
+}
+
+impl<'a, E> TableReader<'a, E> {
+    /// Opens a recording that is not a text; `rows` opens its rows, of which these columns are read.
+    ///
+    /// # Errors
+    /// As of [`TableReader::recording`], and those of `rows`.
+    pub(crate) fn of_columns<R: RowSource<E> + 'a>(
+        columns: &NamedColumns,
+        options: &TableOptions,
+        rows: impl FnOnce(&[usize]) -> Result<R, E>,
+    ) -> Result<Self, E>
+    where
+        E: From<CsvError>,
+    {
+        let dialect = Dialect::of_columns(columns);
+        let options = &options.of_table(&dialect);
+        check_time_unit(&dialect, options)?;
+        let mapping = BoundMapping::new(&dialect, options)?;
+        let rows = Box::new(rows(&mapping.columns())?);
+        Ok(Self::of(rows, dialect, mapping, true))
     }
 
     fn of(
-        rows: Box<dyn RowSource + 'a>,
+        rows: Box<dyn RowSource<E> + 'a>,
         dialect: Dialect,
         mapping: BoundMapping,
         is_recording: bool,
@@ -232,8 +263,15 @@ impl<'a> TableReader<'a> {
         Self { rows, fault: None, dialect, mapping, clock, cells: Cells::default() }
     }
 
+    /// The names of the columns that are not read; none where a mapping says which are.
+    pub fn unread(&self) -> impl Iterator<Item = &str> {
+        let read = self.mapping.columns();
+        let names = self.dialect.names.iter().enumerate().filter(|_| !self.mapping.is_given);
+        names.filter(move |(i, _)| !read.contains(i)).map(|(_, name)| name.as_str())
+    }
+
     /// Takes the reason why the rest of the file could not be read, after the last row.
-    pub(crate) fn take_fault(&mut self) -> Option<SessionFileError> {
+    pub(crate) fn take_fault(&mut self) -> Option<E> {
         self.fault.take()
     }
 
@@ -255,11 +293,11 @@ impl<'a> TableReader<'a> {
         if self.dialect.has_labels {
             self.cells.strip_labels(&self.dialect.names).map_err(fail)?;
         }
-        let has_commas = self.dialect.has_decimal_commas;
-        let t_s = self.clock.next(&self.mapping.time, &self.cells, has_commas).map_err(fail)?;
+        let sign = self.dialect.decimal;
+        let t_s = self.clock.next(&self.mapping.time, &self.cells, sign).map_err(fail)?;
         let value = |quantity: usize| match &self.mapping.quantities[quantity] {
             None => Ok(None),
-            Some(columns) => columns.value(&self.cells, has_commas).map_err(fail),
+            Some(columns) => columns.value(&self.cells, sign).map_err(fail),
         };
         let seq = self.mapping.seq.map_or(Ok(None), |column| self.seq(column)).map_err(fail)?;
         let [cmd_qx_rad, cmd_qy_rad, x_m, y_m] = [value(0)?, value(1)?, value(2)?, value(3)?];
@@ -277,7 +315,7 @@ impl<'a> TableReader<'a> {
                 Ok(text) if cell::is_missing(text) => Ok(None),
                 text => text
                     .ok()
-                    .and_then(|text| text.parse().ok())
+                    .and_then(|text| text.strip_suffix(".0").unwrap_or(text).parse().ok())
                     .map(Some)
                     .ok_or_else(|| "`seq` is not a whole number".to_owned()),
             },
@@ -288,15 +326,20 @@ impl<'a> TableReader<'a> {
     fn is_header(&self) -> bool {
         let names = &self.dialect.names;
         let is_name = |(i, name): (usize, &String)| {
-            self.cells.get(i).is_some_and(|cell| cell::bare(cell) == name.as_bytes())
+            self.cells
+                .get(i)
+                .is_some_and(|cell| cell::bare(cell).eq_ignore_ascii_case(name.as_bytes()))
         };
-        !names.is_empty()
-            && self.cells.len() == names.len()
-            && names.iter().enumerate().all(is_name)
+        // The names of rows have no name.
+        let n_unnamed = names.iter().take_while(|name| name.is_empty()).count();
+        let are = |names: &[String]| {
+            self.cells.len() == names.len() && names.iter().enumerate().all(is_name)
+        };
+        !names.is_empty() && (are(names) || n_unnamed == 1 && are(&names[1..]))
     }
 }
 
-impl Iterator for TableReader<'_> {
+impl<E> Iterator for TableReader<'_, E> {
     type Item = Result<Sample, RowError>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -15,6 +15,7 @@ use utoipa::ToSchema;
 
 use self::cells::{BatchDocument, BatchRowSeed, UnknownKeys};
 pub use self::format::{TelemetryFormat, UnsupportedMediaType};
+use super::foreign_file;
 use super::table::{TableOptions, TableReader, nearest_of};
 use offbd_core::vocabulary::Sample;
 
@@ -146,6 +147,8 @@ fn named(unknown: UnknownKeys) -> Vec<UnknownKeyView> {
 /// [`BatchError`] if a column is missing, or there are too many rows.
 pub fn csv(document: &[u8], options: &TableOptions, limit: usize) -> Result<Batch, BatchError> {
     let malformed = |reason| BatchError::Malformed { pointer: String::new(), reason };
+    let head = &document[..document.len().min(foreign_file::HEAD_BYTES as usize)];
+    foreign_file::check_own(head).map_err(|error| malformed(error.to_string()))?;
     let reader = TableReader::batch(document, options).map_err(|e| malformed(e.to_string()))?;
     let unknown = UnknownKeys::default();
     reader.unread().for_each(|name| unknown.note(name));

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use super::{BadArgument, InputError, NewFile, TableOptions, judge};
+use super::{BadArgument, InputError, NewFile, TableOptions, recordings};
 use offbd_core::engine::Setup;
 use offbd_wire::judging::RecordedSession;
 use offbd_wire::session_file::{SessionFormat, SessionInfo, SessionRowError, TraceWriter};
@@ -38,7 +38,7 @@ pub(super) fn write(
         block: TraceView::default(),
         last_t_s: None,
     };
-    let mut rows = judge::open(path, table)?;
+    let mut rows = recordings::open(path, table)?;
     while let Some(row) = rows.next() {
         match row {
             Ok(sample) => session.sample(sample, || rows.place(), |_| {}),

@@ -12,9 +12,13 @@ use offbd_wire::verdict::{
     kind_words,
 };
 
-/// The verdict on a session in a few words, in colour where stdout shows it.
+/// The verdict on a session in a few words, in colour where stdout shows it. What was not judged beside
+/// a fault has another line.
 pub(super) fn coloured(session: &JudgedSession, profile: Profile) -> String {
-    let words = words(session, profile);
+    let mut words = words(session, profile);
+    if !session.summary.faults.is_empty() {
+        words = words.replace("; ", ";\n");
+    }
     match look(&session.summary) {
         Some(look) => table::coloured(&words, look),
         None => words,

@@ -515,7 +515,8 @@ class NamedKind(TypedDict):
     """
     weight: NotRequired[float | None]
     """
-    Its largest weight among the candidates, in (0, 1]; null if unknown.
+    Its weight among the candidates, in (0, 1]: of the last kind as in the fault's record, of
+    an earlier one the largest; null if unknown.
     """
 
 

@@ -57,7 +57,7 @@ class Verdict:
         """The verdict as a table, for notebooks."""
         summary = self.summary
         judged = f"{summary['samples']} samples in {summary['duration_s']:.1f} s"
-        found = ", ".join(self.confirmed) or "no fault confirmed"
+        found = ", ".join(self.confirmed) or "no confirmed fault"
         caption = f"{escape(summary['session'])}: {escape(found)} ({judged})"
         if not self.faults:
             return f"<p>{caption}</p>"

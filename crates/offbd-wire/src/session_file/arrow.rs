@@ -156,8 +156,8 @@ struct ArrowRows<S: Read + Seek> {
     rows: BatchRows,
 }
 
-impl<S: Read + Seek + Send> RowSource for ArrowRows<S> {
-    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+impl<S: Read + Seek + Send> RowSource<SessionFileError> for ArrowRows<S> {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault<SessionFileError>> {
         while !self.rows.next(cells) {
             match self.batches.as_mut().map_or(Ok(None), Batches::next) {
                 Ok(Some(batch)) => self.rows.set(batch),

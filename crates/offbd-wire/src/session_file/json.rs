@@ -153,6 +153,8 @@ impl Table {
     /// was killed, is rejected when its cells are read as numbers.
     fn read_lines(&mut self, bytes: &[u8]) -> Result<(), SessionFileError> {
         let lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+        // A list without its brackets has a comma behind each row.
+        let lines = lines.map(|line| line.strip_suffix(b",").unwrap_or(line));
         for line in lines.filter(|line| !line.is_empty()) {
             let mut is_row = self.read_line(line);
             if !is_row && let Some(quoted) = with_quotes(line) {
@@ -664,6 +666,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_cut_is_a_row_that_is_rejected() {
+        assert_eq!(text("{\"t\":0,\"x\":1},\n{\"t\":0.1,\"x\":2},\n"), "t,x\n0,1\n0.1,2\n");
         let cut = text("{\"t\":0,\"x\":1}\n{\"t\":0.1,\"x\n");
         assert_eq!(cut, "t,x\n0,1\n\"{\"\"t\"\":0.1,\"\"x\",\"{\"\"t\"\":0.1,\"\"x\"\n");
     }

@@ -240,8 +240,8 @@ struct McapRows<S: Read + Seek> {
     n_read: u64,
 }
 
-impl<S: Read + Seek + Send> RowSource for McapRows<S> {
-    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+impl<S: Read + Seek + Send> RowSource<SessionFileError> for McapRows<S> {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault<SessionFileError>> {
         while let Some(messages) = &mut self.messages {
             let message = match messages.next() {
                 Ok(Some(message)) => message,

@@ -16,7 +16,7 @@ use foxglove::messages::{
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::SessionFileError;
-use super::mcap::{McapFile, Topic, json_schema, nanoseconds, unwritten};
+use super::mcap_file::{McapFile, Topic, json_schema, nanoseconds, unwritten};
 use crate::verdict::{evidence_view, sentence};
 use crate::{asset, words::CodeWord};
 use offbd_core::diagnosis::{AxisEvidence, Evidence, FaultMemory, Transition};

@@ -228,8 +228,8 @@ impl ParquetRows {
     }
 }
 
-impl RowSource for ParquetRows {
-    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+impl RowSource<SessionFileError> for ParquetRows {
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault<SessionFileError>> {
         while !self.rows.next(cells) {
             let read = self.read();
             if !matches!(read, Ok(true)) {

@@ -10,9 +10,8 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use zip::ZipArchive;
 
-use super::SessionFileError;
 use super::byte_budget::ByteBudget;
-use super::xlsx::damaged;
+use super::{SessionFileError, SessionFormat};
 
 /// Decompressed bytes that are read of a workbook, over all its parts. Chosen: a million rows of
 /// six cells of 60 bytes. A workbook with more is refused.
@@ -66,6 +65,10 @@ pub(super) fn check<S: Read + Seek>(source: &mut S) -> Result<(), SessionFileErr
         check.part(archive.by_index(i).map_err(damaged)?)?;
     }
     check.kept.spend(2 * check.n_copies * check.longest)
+}
+
+pub(super) fn damaged(reason: impl ToString) -> SessionFileError {
+    SessionFileError::Damaged { format: SessionFormat::Xlsx, reason: reason.to_string() }
 }
 
 fn expands(what: &'static str, limit: u64) -> SessionFileError {

@@ -11,7 +11,7 @@ use calamine::{DataRef, ExcelDateTime, Reader, Xlsx};
 use jiff::Timestamp;
 
 use super::line::{line_of, write_line};
-use super::workbook_check;
+use super::workbook_check::{self, damaged};
 use super::{SessionFileError, SessionFormat, guarded};
 
 /// The day 1970-01-01 as spreadsheets count days, from 1900 and from 1904 on.
@@ -24,10 +24,6 @@ const MAX_ROWS: u32 = 1 << 20;
 
 /// Longest text of a sheet, bytes. Chosen: a million rows of six numbers with all their digits.
 const MAX_SHEET_BYTES: usize = 128 << 20;
-
-pub(super) fn damaged(reason: impl ToString) -> SessionFileError {
-    SessionFileError::Damaged { format: SessionFormat::Xlsx, reason: reason.to_string() }
-}
 
 fn wrong(sheet: &str, reason: impl ToString) -> SessionFileError {
     SessionFileError::Sheet { sheet: sheet.to_owned(), reason: reason.to_string() }

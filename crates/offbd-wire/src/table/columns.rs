@@ -1,26 +1,29 @@
 //! Which columns of a table the quantities of a sample come from.
 
-use super::cell;
+use super::cell::{self, DecimalSign};
 use super::dialect::Dialect;
 use super::expression::{ColumnMapping, ColumnName, Expression, MappingError, Term};
 use super::rows::Cells;
-use super::{CsvError, TableOptions, guess};
+use super::{CsvError, TableOptions, guess, own_names};
 use crate::session_csv::COLUMNS;
 
 /// The quantities of an axis, as indices in [`COLUMNS`].
-pub(super) struct Axis {
-    pub(super) word: &'static str,
-    pub(super) command: usize,
-    pub(super) position: usize,
+pub(crate) struct Axis {
+    pub(crate) word: &'static str,
+    pub(crate) command: usize,
+    pub(crate) position: usize,
     /// The sign of the acceleration for a positive command: +qy moves the ball toward +x, +qx
     /// toward -y.
-    pub(super) sign: f64,
+    pub(crate) sign: f64,
 }
 
-pub(super) const AXES: [Axis; 2] = [
+pub(crate) const AXES: [Axis; 2] = [
     Axis { word: "x", command: 2, position: 3, sign: 1.0 },
     Axis { word: "y", command: 1, position: 4, sign: -1.0 },
 ];
+
+/// How a time is written, for one that is not a number.
+const TIME_ADVICE: &str = "; a time is in seconds, or as 2026-02-20 13:51:00.25 in all rows";
 
 /// A column with its factor, or a constant.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,10 +41,12 @@ pub(super) struct BoundColumns {
 }
 
 impl BoundColumns {
-    /// The factor, if it is one column alone.
-    pub(super) fn factor(&self) -> Option<f64> {
-        match &self.terms[..] {
-            [BoundTerm { column: Some(_), factor }] => Some(*factor),
+    /// The factor of the column and the sum of the constants, if it is one column with constants.
+    pub(super) fn line(&self) -> Option<(f64, f64)> {
+        let mut columns = self.terms.iter().filter(|term| term.column.is_some());
+        let constants = self.terms.iter().filter(|term| term.column.is_none());
+        match (columns.next(), columns.next()) {
+            (Some(column), None) => Some((column.factor, constants.map(|term| term.factor).sum())),
             _ => None,
         }
     }
@@ -50,11 +55,7 @@ impl BoundColumns {
     ///
     /// # Errors
     /// The reason why it is not a number.
-    pub(super) fn value(
-        &self,
-        cells: &Cells,
-        has_decimal_commas: bool,
-    ) -> Result<Option<f64>, String> {
+    pub(super) fn value(&self, cells: &Cells, sign: DecimalSign) -> Result<Option<f64>, String> {
         let mut sum: Option<f64> = None;
         for BoundTerm { column, factor } in &self.terms {
             let value = match column {
@@ -62,7 +63,7 @@ impl BoundColumns {
                 Some(column) => {
                     let value = match cells.number(*column) {
                         Some(value) => value,
-                        None => match self.parsed(cells, *column, has_decimal_commas)? {
+                        None => match self.parsed(cells, *column, sign)? {
                             Some(value) => value,
                             None => return Ok(None),
                         },
@@ -81,11 +82,13 @@ impl BoundColumns {
         &self,
         cells: &Cells,
         column: usize,
-        has_decimal_commas: bool,
+        sign: DecimalSign,
     ) -> Result<Option<f64>, String> {
         let bytes = cells.get(column).ok_or_else(|| format!("no field `{}`", self.name))?;
-        cell::parse(bytes, has_decimal_commas)
-            .map_err(|reason| format!("`{}`: {reason}", self.name))
+        cell::parse(bytes, sign).map_err(|reason| {
+            let advice = if self.name == COLUMNS[0] { TIME_ADVICE } else { "" };
+            format!("`{}`: {reason}{advice}", self.name)
+        })
     }
 
     fn columns(&self) -> impl Iterator<Item = usize> {
@@ -115,43 +118,13 @@ pub(super) struct BoundMapping {
     pub(super) is_given: bool,
 }
 
-/// Returns the mapping with the columns that have the name of a quantity, in any case, where
-/// `mapping` says nothing.
-///
-/// # Errors
-/// [`CsvError::DoubleColumn`].
-pub(super) fn with_own_names(
-    mapping: &ColumnMapping,
-    dialect: &Dialect,
-) -> Result<ColumnMapping, CsvError> {
-    let mut whole = mapping.clone();
-    for (slot, name) in whole.expressions.iter_mut().zip(COLUMNS) {
-        if slot.is_none()
-            && let Some(column) = find(dialect, name)?
-        {
-            let column = Some(ColumnName::Number(column + 1));
-            *slot = Some(Expression { terms: vec![Term { column, factor: 1.0 }] });
-        }
-    }
-    Ok(whole)
-}
-
-fn find(dialect: &Dialect, name: &'static str) -> Result<Option<usize>, CsvError> {
-    let mut found =
-        (0..dialect.names.len()).filter(|i| dialect.names[*i].eq_ignore_ascii_case(name));
-    match (found.next(), found.next()) {
-        (_, Some(_)) => Err(CsvError::DoubleColumn(name)),
-        (first, None) => Ok(first),
-    }
-}
-
 impl BoundMapping {
     /// Finds the columns that `options` map, and those with the name of a quantity.
     ///
     /// # Errors
     /// [`CsvError`] if a column is missing.
     pub(super) fn new(dialect: &Dialect, options: &TableOptions) -> Result<Self, CsvError> {
-        let mapping = with_own_names(&options.columns, dialect)?;
+        let mapping = own_names::with_own_names(&options.columns, dialect)?;
         let missing = |quantity: usize| CsvError::MissingColumn {
             name: COLUMNS[quantity],
             found: guess::listed(dialect),
@@ -187,7 +160,7 @@ impl BoundMapping {
             (None, rate) => TimeSource::Rows(1.0 / rate.unwrap_or(1.0)),
         };
         let is_given = !options.columns.is_empty();
-        Ok(Self { time, quantities, seq: find(dialect, "seq")?, is_given })
+        Ok(Self { time, quantities, seq: own_names::find(dialect, "seq")?, is_given })
     }
 
     /// The columns that are read.
@@ -205,22 +178,28 @@ impl BoundMapping {
     }
 }
 
-/// Whether a table has all columns that `mapping` names.
+/// Whether `mapping` is for a table: it has all columns that the mapping names. Numbers of columns
+/// are not for a table with the names of the quantities, whose columns are in another order.
 pub(super) fn has_all(dialect: &Dialect, mapping: &ColumnMapping) -> bool {
+    let is_here = |name: &ColumnName| match name {
+        ColumnName::Number(_) => !dialect.has_own_names() && places(dialect, name).count() > 0,
+        ColumnName::Name(_) => places(dialect, name).count() > 0,
+    };
     let mut terms = mapping.expressions.iter().flatten().flat_map(|e| &e.terms);
-    terms.all(|term| term.column.as_ref().is_none_or(|name| place(dialect, name).is_some()))
+    terms.all(|term| term.column.as_ref().is_none_or(is_here))
 }
 
-/// Returns where the column is.
-fn place(dialect: &Dialect, name: &ColumnName) -> Option<usize> {
-    match name {
-        ColumnName::Number(number) => Some(number - 1).filter(|i| *i < dialect.n_columns()),
-        ColumnName::Name(name) => {
-            let exact = dialect.names.iter().position(|column| column == name);
-            let same = |column: &String| column.eq_ignore_ascii_case(name);
-            exact.or_else(|| dialect.names.iter().position(same))
-        }
-    }
+/// Returns where columns of this name are: those with the same letters, else those that differ in
+/// their case.
+fn places<'a>(dialect: &'a Dialect, name: &'a ColumnName) -> impl Iterator<Item = usize> + 'a {
+    let is_exact = matches!(name, ColumnName::Name(name) if dialect.names.contains(name));
+    let is_it = move |column: usize| match name {
+        ColumnName::Number(number) => number - 1 == column,
+        ColumnName::Name(name) => dialect.names.get(column).is_some_and(|other| {
+            if is_exact { other == name } else { other.eq_ignore_ascii_case(name) }
+        }),
+    };
+    (0..dialect.n_columns()).filter(move |column| is_it(*column))
 }
 
 /// Finds the columns of an expression.
@@ -230,7 +209,14 @@ fn bind(
     expression: &Expression,
 ) -> Result<BoundColumns, CsvError> {
     let column = |name: &ColumnName| -> Result<usize, CsvError> {
-        place(dialect, name).ok_or_else(|| {
+        let mut places = places(dialect, name);
+        let place = places.next();
+        if let (Some(first), Some(second)) = (place, places.next()) {
+            let reason =
+                format!("is the name of two columns; write #{} or #{}", first + 1, second + 1);
+            return Err(MappingError::new(name, reason).into());
+        }
+        place.ok_or_else(|| {
             let reason = match guess::nearest(dialect, name) {
                 Some(near) => format!(
                     "is not a column of the file; the nearest is `{near}`, of {}",
@@ -251,17 +237,12 @@ fn bind(
     Ok(BoundColumns { terms, name: quantity })
 }
 
-/// The time is a date if the first rows have dates where numbers would be.
+/// The time is a date if the first value of each of its columns is one.
 fn time_source(dialect: &Dialect, columns: BoundColumns) -> TimeSource {
     let indices: Option<Vec<usize>> =
         columns.terms.iter().map(|term| term.column.filter(|_| term.factor == 1.0)).collect();
-    let is_moment = |indices: &Vec<usize>| {
-        let first = dialect.first_rows.first();
-        first.is_some_and(|row| {
-            indices.iter().all(|i| row.get(*i).is_some_and(|cell| cell::is_moment(cell)))
-        })
-    };
-    match indices.filter(is_moment) {
+    let is_moment = |i: &usize| guess::first_value(dialect, *i).is_some_and(cell::is_moment);
+    match indices.filter(|indices| indices.iter().all(is_moment)) {
         Some(indices) => TimeSource::Moments(indices),
         None => TimeSource::Columns(columns),
     }

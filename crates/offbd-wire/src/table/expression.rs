@@ -5,10 +5,10 @@
 //! ```
 //!
 //! A mapping is a list of `QUANTITY=EXPRESSION`. An expression is a sum of columns and constants,
-//! each with any number of factors: `*NUMBER`, `/NUMBER` or `/UNIT`. A column is written by its
-//! name, in quotes if the name has blanks or one of `+-*/,='"`, or by its number: `#1` is the
-//! first. The time may be a date, or a date and a time of day: `t_s=date+clock`. `y_m=none` leaves
-//! a quantity out.
+//! each with any number of factors: `*NUMBER`, `/NUMBER` or `/UNIT`, or `NUMBER*` before it. A
+//! column is written by its name, in quotes if the name has blanks or one of `+-*/,='"`, or by its
+//! number: `#1` is the first. The time may be a date, or a date and a time of day:
+//! `t_s=date+clock`. `y_m=none` leaves a quantity out.
 
 use std::fmt;
 
@@ -49,6 +49,13 @@ impl fmt::Display for ColumnName {
             Self::Name(name) => write!(f, "'{name}'"),
         }
     }
+}
+
+/// Returns the name of a column, if it has one that no other column has.
+pub(super) fn own_name(names: &[String], column: usize) -> Option<&str> {
+    let name = names.get(column).filter(|name| !name.is_empty())?;
+    let is_same = |other: &&String| other.eq_ignore_ascii_case(name);
+    (names.iter().filter(is_same).count() == 1).then_some(name)
 }
 
 /// Whether a column's name needs no quotes.
@@ -93,7 +100,7 @@ impl ColumnMapping {
 
     /// Returns the mapping with names instead of the numbers of columns that have one.
     #[must_use]
-    pub(super) fn with_names(&self, names: &[String]) -> Self {
+    pub(crate) fn with_names(&self, names: &[String]) -> Self {
         let named = |e: &Option<Expression>| e.as_ref().map(|e| e.with_names(names));
         Self { expressions: self.expressions.each_ref().map(named) }
     }
@@ -136,13 +143,13 @@ impl fmt::Display for ColumnMapping {
 impl Expression {
     /// Returns the expression with names instead of the numbers of columns that have one.
     #[must_use]
-    pub(super) fn with_names(&self, names: &[String]) -> Self {
+    pub(crate) fn with_names(&self, names: &[String]) -> Self {
         let mut named = self.clone();
         for term in &mut named.terms {
             if let Some(ColumnName::Number(n)) = &term.column
-                && let Some(name) = names.get(n - 1).filter(|name| !name.is_empty())
+                && let Some(name) = own_name(names, n - 1)
             {
-                term.column = Some(ColumnName::Name(name.clone()));
+                term.column = Some(ColumnName::Name(name.to_owned()));
             }
         }
         named
@@ -150,7 +157,7 @@ impl Expression {
 
     /// Returns the expression of the quantity with this index in [`COLUMNS`] as it is parsed.
     #[must_use]
-    pub(super) fn text(&self, quantity: usize) -> String {
+    pub(crate) fn text(&self, quantity: usize) -> String {
         struct Written<'a>(&'a Expression, Dimension);
         impl fmt::Display for Written<'_> {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -196,7 +203,7 @@ const ANGLES: &[(&str, f64)] = &[
 
 /// What a quantity is measured in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Dimension {
+pub(crate) enum Dimension {
     Time,
     Angle,
     Length,
@@ -205,7 +212,7 @@ pub(super) enum Dimension {
 impl Dimension {
     /// The dimension of the quantity with this index in [`COLUMNS`].
     #[must_use]
-    pub(super) const fn of(quantity: usize) -> Self {
+    pub(crate) const fn of(quantity: usize) -> Self {
         match quantity {
             0 => Self::Time,
             1 | 2 => Self::Angle,
@@ -215,7 +222,7 @@ impl Dimension {
 
     /// The units of this dimension.
     #[must_use]
-    pub(super) const fn units(self) -> &'static [(&'static str, f64)] {
+    pub(crate) const fn units(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Time => TIMES,
             Self::Length => LENGTHS,
@@ -298,8 +305,12 @@ impl<'a> Parser<'a> {
             self.rest = self.rest.trim_start();
             let Some(operator @ ('*' | '/')) = self.rest.chars().next() else { break };
             self.rest = self.rest[1..].trim_start();
-            let factor = self.factor(operator, dimension)?;
-            term.factor *= factor;
+            // The column may follow its factor.
+            if term.column.is_none() && operator == '*' && !self.starts_as_number() {
+                term.column = Some(self.column(quantity)?);
+            } else {
+                term.factor *= self.factor(operator, dimension)?;
+            }
         }
         if term.factor == 0.0 || !term.factor.is_finite() {
             let what = term.column.map_or_else(|| "0".to_owned(), |column| column.to_string());
@@ -309,8 +320,18 @@ impl<'a> Parser<'a> {
     }
 
     fn factor(&mut self, operator: char, dimension: Dimension) -> Result<f64, MappingError> {
+        let sign = match self.rest.strip_prefix('-') {
+            Some(rest)
+                if operator == '*'
+                    && rest.starts_with(|c: char| c.is_ascii_digit() || c == '.') =>
+            {
+                self.rest = rest;
+                -1.0
+            }
+            _ => 1.0,
+        };
         if let Some(number) = self.number() {
-            return Ok(if operator == '*' { number } else { 1.0 / number });
+            return Ok(sign * if operator == '*' { number } else { 1.0 / number });
         }
         let word = self.piece().to_owned();
         let units = dimension.units();
@@ -362,6 +383,10 @@ impl<'a> Parser<'a> {
         }
         self.rest = rest;
         number.parse().ok()
+    }
+
+    fn starts_as_number(&self) -> bool {
+        self.rest.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == '-')
     }
 
     fn column(&mut self, quantity: &str) -> Result<ColumnName, MappingError> {
@@ -417,6 +442,12 @@ mod tests {
         assert_eq!(x.as_ref().unwrap().terms, [column("ball_x_px", 0.000235), constant]);
         let third = Term { column: Some(ColumnName::Number(3)), factor: 1e-3 * 2.0 };
         assert_eq!(y.as_ref().unwrap().terms, [column("ball y [cm]", 1e-2), third]);
+        for text in ["x_m=a*-0.5+1", "x_m=-0.5*a+1", "x_m=1-a*0.5", "x_m=-a/2+1"] {
+            let mapping = parse(text).unwrap();
+            let terms = &mapping.expressions[3].as_ref().unwrap().terms;
+            assert!(terms.contains(&column("a", -0.5)), "{text}: {terms:?}");
+            assert!(terms.contains(&Term { column: None, factor: 1.0 }), "{text}: {terms:?}");
+        }
         let mapping = parse("cmd_qx_rad=none , x_m=none/mm, y_m= none").unwrap();
         let [_, qx, _, x, y] = &mapping.expressions;
         assert_eq!((qx, y), (&Some(Expression::default()), &Some(Expression::default())));

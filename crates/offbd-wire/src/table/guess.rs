@@ -3,9 +3,10 @@
 
 use super::CsvError;
 use super::cell;
-use super::columns::with_own_names;
 use super::dialect::Dialect;
-use super::expression::{ColumnMapping, ColumnName, Dimension, Expression, Term};
+use super::expression::{ColumnMapping, ColumnName, Dimension, Expression, Term, own_name};
+use super::own_names::with_own_names;
+use super::unit::{TIME_WORDS, is_unit, unit_of};
 use crate::session_csv::COLUMNS;
 use offbd_core::vocabulary::Brief;
 
@@ -93,7 +94,7 @@ fn rounded(value: f64) -> f64 {
 
 fn values(dialect: &Dialect, column: usize) -> impl Iterator<Item = f64> {
     let rows = dialect.first_rows.iter().filter_map(move |row| row.get(column));
-    rows.filter_map(|cell| cell::parse(cell.as_bytes(), dialect.has_decimal_commas).ok().flatten())
+    rows.filter_map(|cell| cell::parse(cell.as_bytes(), dialect.decimal).ok().flatten())
 }
 
 fn median_step(dialect: &Dialect, column: usize) -> Option<f64> {
@@ -116,24 +117,6 @@ enum Meaning {
 }
 
 /// Words of names; a name is split at signs and at changes from small to capital letters.
-const TIMES: [&str; 16] = [
-    "t",
-    "ts",
-    "time",
-    "timestamp",
-    "zeit",
-    "clock",
-    "date",
-    "datetime",
-    "sec",
-    "seconds",
-    "millis",
-    "micros",
-    "elapsed",
-    "ms",
-    "us",
-    "stamp",
-];
 const TURNS: [(&str, usize); 8] = [
     ("qx", 0),
     ("roll", 0),
@@ -180,34 +163,6 @@ const OTHERS: [&str; 20] = [
 const COUNTS: [&str; 11] =
     ["px", "pix", "pixel", "pixels", "adc", "raw", "count", "counts", "tick", "ticks", "pwm"];
 
-/// Words of units as they stand in names and below them, each with the unit of a mapping.
-const UNIT_WORDS: [(&str, &str); 24] = [
-    ("s", "s"),
-    ("sec", "s"),
-    ("second", "s"),
-    ("seconds", "s"),
-    ("ms", "ms"),
-    ("millis", "ms"),
-    ("us", "us"),
-    ("µs", "us"),
-    ("μs", "us"),
-    ("micros", "us"),
-    ("ns", "ns"),
-    ("m", "m"),
-    ("cm", "cm"),
-    ("mm", "mm"),
-    ("in", "in"),
-    ("inch", "in"),
-    ("rad", "rad"),
-    ("mrad", "mrad"),
-    ("deg", "deg"),
-    ("°", "deg"),
-    ("degree", "deg"),
-    ("degrees", "deg"),
-    ("grad", "deg"),
-    ("min", "min"),
-];
-
 /// Splits a name into words in small letters.
 fn words(name: &str) -> Vec<String> {
     let mut words = vec![String::new()];
@@ -227,18 +182,10 @@ fn words(name: &str) -> Vec<String> {
     words
 }
 
-/// Returns the unit that a word names, in the dimension of a quantity.
-fn unit_of(word: &str, dimension: Dimension) -> Option<&'static str> {
-    let word = word.trim_matches(|c: char| "[]()".contains(c)).to_lowercase();
-    let (_, unit) = UNIT_WORDS.iter().find(|(known, _)| *known == word)?;
-    dimension.units().iter().any(|(known, _)| known == unit).then_some(*unit)
-}
-
 fn meaning(name: &str) -> Option<Meaning> {
     let mut words = words(name);
     // The unit at the end is not a part of the name, unless it is the whole name.
-    if words.len() > 1 && UNIT_WORDS.iter().any(|(unit, _)| words.last().is_some_and(|w| w == unit))
-    {
+    if words.len() > 1 && words.last().is_some_and(|word| is_unit(word)) {
         words.pop();
     }
     let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
@@ -268,7 +215,7 @@ fn meaning(name: &str) -> Option<Meaning> {
     if words.len() == 1 && has(&BALLS) {
         return Some(Meaning::Position(0));
     }
-    has(&TIMES).then_some(Meaning::Time)
+    has(&TIME_WORDS).then_some(Meaning::Time)
 }
 
 /// Whether a column's name says that it holds pixels or counts.
@@ -284,7 +231,7 @@ fn meaning_in_unit(name: &str) -> Option<Meaning> {
 }
 
 /// Returns the columns of commands and positions in pixels or counts that `mapping` does not use.
-pub(super) fn counts(dialect: &Dialect, mapping: &ColumnMapping) -> Vec<ColumnName> {
+pub(crate) fn counts(dialect: &Dialect, mapping: &ColumnMapping) -> Vec<ColumnName> {
     let terms = || mapping.expressions.iter().flatten().flat_map(|e| &e.terms);
     let names = dialect.names.iter().enumerate();
     let counts = names.filter(|(_, name)| meaning(name) != meaning_in_unit(name));
@@ -294,27 +241,29 @@ pub(super) fn counts(dialect: &Dialect, mapping: &ColumnMapping) -> Vec<ColumnNa
 
 /// A guess, with its reason.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Guess {
-    pub(super) quantity: usize,
+pub(crate) struct Guess {
+    pub(crate) quantity: usize,
     pub(super) column: usize,
-    pub(super) unit: &'static str,
-    pub(super) reason: String,
+    /// The column of the time of day that is added to a date.
+    clock: Option<usize>,
+    pub(crate) unit: &'static str,
+    pub(crate) reason: String,
 }
 
 impl Guess {
     fn expression(&self, dialect: &Dialect) -> Expression {
         let units = Dimension::of(self.quantity).units();
         let factor = units.iter().find(|(word, _)| *word == self.unit).map_or(1.0, |(_, si)| *si);
-        Expression { terms: vec![Term { column: Some(name(dialect, self.column)), factor }] }
+        let columns = [Some(self.column), self.clock].into_iter().flatten();
+        let term = |column| Term { column: Some(name(dialect, column)), factor };
+        Expression { terms: columns.map(term).collect() }
     }
 }
 
-/// Returns the name of a column, or its number.
-pub(super) fn name(dialect: &Dialect, column: usize) -> ColumnName {
-    match dialect.names.get(column) {
-        Some(name) if !name.is_empty() => ColumnName::Name(name.clone()),
-        _ => ColumnName::Number(column + 1),
-    }
+/// Returns the name of a column; its number if it has no name, or another column has the same.
+pub(crate) fn name(dialect: &Dialect, column: usize) -> ColumnName {
+    own_name(&dialect.names, column)
+        .map_or(ColumnName::Number(column + 1), |name| ColumnName::Name(name.to_owned()))
 }
 
 /// Guesses the columns of the quantities that `known` does not map.
@@ -361,11 +310,21 @@ pub(super) fn guesses(dialect: &Dialect, known: &ColumnMapping) -> Vec<Guess> {
             let alike = without_number(first) == without_number(second);
             (alike && all.next().is_none()).then_some(second)
         };
+        let of_moments = || {
+            let is_moment = |i: &usize| first_value(dialect, *i).is_some_and(cell::is_moment);
+            let is_duration = |i: &usize| first_value(dialect, *i).is_some_and(cell::is_duration);
+            let mut moments = (0..dialect.n_columns()).filter(is_moment).collect::<Vec<_>>();
+            // A duration may be another quantity, such as a latency.
+            moments.sort_by_key(is_duration);
+            moments.first().copied().filter(|_| quantity == 0)
+        };
         let found = if quantity == 0 { time_by_unit() } else { None };
-        let found = found.or_else(|| meanings_wanted.iter().find_map(has));
+        let found = found.or_else(|| meanings_wanted.iter().find_map(has)).or_else(of_moments);
         if let Some(column) = found.or_else(|| second_of_two().filter(|_| quantity == 1)) {
+            let (column, clock) = with_clock(dialect, column);
             taken.push(column);
-            guesses.push(Guess { quantity, column, unit: "", reason: String::new() });
+            taken.extend(clock);
+            guesses.push(Guess { quantity, column, clock, unit: "", reason: String::new() });
         }
     }
     let columns = |dimension: Dimension| {
@@ -381,13 +340,35 @@ pub(super) fn guesses(dialect: &Dialect, known: &ColumnMapping) -> Vec<Guess> {
     guesses
 }
 
+/// The first value of a column that is not missing.
+pub(super) fn first_value(dialect: &Dialect, column: usize) -> Option<&str> {
+    let cells = dialect.first_rows.iter().filter_map(|row| row.get(column));
+    cells.map(String::as_str).find(|cell| !cell::is_missing(cell))
+}
+
+/// Returns the column of the date and that of the time of day, if `column` is one of them and there is
+/// the other.
+fn with_clock(dialect: &Dialect, column: usize) -> (usize, Option<usize>) {
+    let first = |is_it: fn(&str) -> bool| {
+        (0..dialect.n_columns()).find(|i| first_value(dialect, *i).is_some_and(is_it))
+    };
+    match first_value(dialect, column) {
+        Some(value) if cell::is_day(value) => (column, first(cell::is_time_of_day)),
+        Some(value) if cell::is_time_of_day(value) => match first(cell::is_day) {
+            Some(day) => (day, Some(column)),
+            None => (column, None),
+        },
+        _ => (column, None),
+    }
+}
+
 /// The reasons of units that the file itself states.
 pub(super) const BY_NAME: &str = "its name says the unit";
 const BY_UNIT_LINE: &str = "the line below the names says the unit";
 
 impl Guess {
     /// Whether the file states the unit.
-    pub(super) fn is_stated(&self) -> bool {
+    pub(crate) fn is_stated(&self) -> bool {
         [BY_NAME, BY_UNIT_LINE].contains(&self.reason.as_str())
     }
 
@@ -417,9 +398,8 @@ fn unit(
     let by_size = |unit| (unit, format!("values up to {}", Brief(rounded(largest))));
     match dimension {
         Dimension::Time => {
-            let is_date = dialect.first_rows.first().and_then(|row| row.get(column));
-            if is_date.is_some_and(|cell| cell::is_moment(cell)) {
-                return ("s", "its values are dates or times of day".to_owned());
+            if first_value(dialect, column).is_some_and(cell::is_moment) {
+                return ("s", "its values are dates, times of day or durations".to_owned());
             }
             let step = median_step(dialect, column).unwrap_or_default();
             let unit = LONGEST_STEP.iter().find(|(longest, _)| step > *longest);
@@ -432,7 +412,7 @@ fn unit(
 }
 
 /// Returns `known` with the guesses for all else.
-pub(super) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMapping, Vec<Guess>) {
+pub(crate) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMapping, Vec<Guess>) {
     let mut mapping = with_own_names(known, dialect).unwrap_or_else(|_| known.clone());
     let mut guesses = guesses(dialect, &mapping);
     if known.expressions[0].is_none()
@@ -440,7 +420,7 @@ pub(super) fn mapping(dialect: &Dialect, known: &ColumnMapping) -> (ColumnMappin
         && let Some(step) = median_step(dialect, column)
         && let Some((_, unit)) = LONGEST_STEP.iter().find(|(longest, _)| step > *longest)
     {
-        guesses.insert(0, Guess { quantity: 0, column, unit, reason: by_step(step) });
+        guesses.insert(0, Guess { quantity: 0, column, clock: None, unit, reason: by_step(step) });
     }
     for guess in &guesses {
         mapping.expressions[guess.quantity] = Some(guess.expression(dialect));

@@ -2,10 +2,9 @@
 
 use std::io::{self, BufRead, BufReader, Read};
 
-use super::cell;
-use crate::session_file::SessionFileError;
+use super::cell::{self, DecimalSign};
 
-/// Longest row, bytes. Chosen: a row has a hundred, and other columns are rarely long.
+/// Longest row that is kept, bytes. Chosen: a row has a hundred, and other columns are rarely long.
 const MAX_ROW_BYTES: usize = 1 << 20;
 
 /// Bytes that are read at a time.
@@ -100,7 +99,9 @@ impl Cells {
         let mut start = 0;
         for (end, byte) in self.bytes.iter().chain([&separator]).enumerate() {
             let is_blank = separator == b' ' && matches!(byte, b' ' | b'\t');
-            if *byte != separator && !is_blank {
+            // A blank after a colon is within `x: 0.1`.
+            let follows_colon = is_blank && end > start && self.bytes[end - 1] == b':';
+            if *byte != separator && !is_blank || follows_colon && end < self.bytes.len() {
                 continue;
             }
             if separator != b' ' || end > start {
@@ -110,28 +111,39 @@ impl Cells {
         }
     }
 
+    /// Splits a row with quotation marks, which are taken off the cells that begin with one.
     fn split_quoted(&mut self, separator: u8) {
-        let mut reader = csv::ReaderBuilder::new()
-            .delimiter(separator)
-            .has_headers(false)
-            .flexible(true)
-            .from_reader(self.bytes.as_slice());
-        let mut record = csv::ByteRecord::new();
-        if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
-            record.clear();
-        }
-        let mut start = 0;
-        let kept = record.iter().filter(|cell| separator != b' ' || !cell.is_empty());
+        let mut quotes = Quotes::default();
         let mut bytes = Vec::with_capacity(self.bytes.len());
-        for cell in kept {
-            // Quotes after a blank are not a part of the cell.
-            let bare = cell::bare(cell);
-            let cell = bare.strip_prefix(b"\"").and_then(|c| c.strip_suffix(b"\"")).unwrap_or(bare);
-            bytes.extend_from_slice(cell);
-            self.ranges.push((start, bytes.len()));
-            start = bytes.len();
+        let (mut start, mut from) = (0, 0);
+        for (at, byte) in self.bytes.iter().chain([&separator]).enumerate() {
+            let is_blank = separator == b' ' && matches!(byte, b' ' | b'\t');
+            let ends = (*byte == separator || is_blank) && !quotes.is_open;
+            if ends || at == self.bytes.len() {
+                let cell = &self.bytes[from..at];
+                if separator != b' ' || !cell.is_empty() {
+                    push_unquoted(&mut bytes, cell);
+                    self.ranges.push((start, bytes.len()));
+                    start = bytes.len();
+                }
+                from = at + 1;
+            }
+            quotes.read(&[*byte], if is_blank { *byte } else { separator });
         }
         self.bytes = bytes;
+    }
+}
+
+/// Appends a cell without the quotation marks and blanks around it; two marks within are one.
+fn push_unquoted(bytes: &mut Vec<u8>, cell: &[u8]) {
+    let bare = cell::bare(cell);
+    let Some(inner) = bare.strip_prefix(b"\"") else { return bytes.extend_from_slice(bare) };
+    let mut is_second = false;
+    for byte in inner {
+        is_second = *byte == b'"' && !is_second;
+        if !is_second {
+            bytes.push(*byte);
+        }
     }
 }
 
@@ -141,22 +153,22 @@ impl From<&str> for Cells {
     }
 }
 
-/// Why a row of a table has no cells.
+/// Why a row of a table has no cells; `E` is why a file cannot be read.
 #[derive(Debug)]
-pub(crate) enum RowFault {
+pub(crate) enum RowFault<E> {
     /// The row is rejected for this reason, and the next one can be read.
     Rejected(String),
     /// The rest of the file cannot be read, so that nothing of it may be kept.
-    Unreadable(SessionFileError),
+    Unreadable(E),
 }
 
-/// The rows of a table, one after the other.
-pub(crate) trait RowSource: Send {
+/// The rows of a table, one after the other, of a file that fails with `E`.
+pub(crate) trait RowSource<E>: Send {
     /// Reads the next row; false at the end.
     ///
     /// # Errors
     /// [`RowFault`].
-    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault>;
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault<E>>;
 
     /// The number of the line, or of the row, that was read last, from 1.
     fn line(&self) -> u64;
@@ -185,11 +197,25 @@ impl Quotes {
     }
 }
 
+/// How the rows of a text are written.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RowLayout {
+    pub(super) separator: u8,
+    /// The beginning of a line that is a comment, if there is one.
+    pub(super) comment: Option<u8>,
+    /// Cells of a row.
+    pub(super) n_cells: usize,
+    /// Whether a row may have more cells, since the last column has words, which may have the
+    /// separator.
+    pub(super) may_have_more: bool,
+}
+
 /// Reads the rows of a text.
 pub(super) struct Rows<'a> {
     source: BufReader<Box<dyn Read + Send + 'a>>,
-    separator: u8,
-    comment: Option<u8>,
+    layout: RowLayout,
+    /// A line that was read after one whose quotation mark is never closed.
+    next_line: Option<Vec<u8>>,
     /// Number of the line read last, from 1.
     last_line: u64,
     /// Number of the first line of the row read last.
@@ -201,34 +227,57 @@ impl<'a> Rows<'a> {
     /// Reads `source`, which begins after `n_lines` lines.
     pub(super) fn new(
         source: Box<dyn Read + Send + 'a>,
-        separator: u8,
-        comment: Option<u8>,
+        layout: RowLayout,
         n_lines: usize,
     ) -> Self {
         let source = BufReader::with_capacity(BLOCK_BYTES, source);
         let line = n_lines as u64;
-        Self { source, separator, comment, line, last_line: line, is_over: false }
+        Self { source, layout, next_line: None, line, last_line: line, is_over: false }
+    }
+
+    /// Appends a line with its end; of one that is longer than a row, the rest is skipped.
+    fn read_line(&mut self, row: &mut Vec<u8>) -> io::Result<()> {
+        if let Some(line) = self.next_line.take() {
+            row.extend_from_slice(&line);
+            self.last_line += 1;
+            return Ok(());
+        }
+        let room = (MAX_ROW_BYTES + 1).saturating_sub(row.len());
+        let n = self.source.by_ref().take(room as u64).read_until(b'\n', row)?;
+        if row.len() > MAX_ROW_BYTES && row.last() != Some(&b'\n') {
+            self.source.skip_until(b'\n')?;
+        }
+        self.is_over = n == 0;
+        self.last_line += u64::from(n > 0);
+        Ok(())
     }
 
     /// Reads a line, and those after it if a quotation mark is not closed.
-    fn row(&mut self, row: &mut Vec<u8>) -> io::Result<()> {
+    fn row<E: From<io::Error>>(&mut self, row: &mut Vec<u8>) -> Result<(), RowFault<E>> {
         row.clear();
         let mut quotes = Quotes::default();
         loop {
             let start = row.len();
-            let room = (MAX_ROW_BYTES + 1).saturating_sub(start);
-            let n = self.source.by_ref().take(room as u64).read_until(b'\n', row)?;
-            if row.len() > MAX_ROW_BYTES {
-                let reason = "a row is longer than 1 MiB; the rest of the file is not read";
-                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+            if let Err(error) = self.read_line(row) {
+                self.is_over = true;
+                return Err(RowFault::Unreadable(error.into()));
             }
-            self.is_over = n == 0;
-            self.last_line += u64::from(n > 0);
-            quotes.read(&row[start..], self.separator);
-            let is_comment =
-                || self.comment.is_some() && cell::bare(row).first().copied() == self.comment;
-            if self.is_over || !quotes.is_open || is_comment() {
+            if row.len() > MAX_ROW_BYTES {
+                return Err(RowFault::Rejected("a row is longer than 1 MiB".to_owned()));
+            }
+            quotes.read(&row[start..], self.layout.separator);
+            let is_comment = self.layout.comment.is_some()
+                && cell::bare(row).first().copied() == self.layout.comment;
+            if !quotes.is_open || is_comment {
                 break;
+            }
+            if self.is_over || start > 0 && self.is_row(&row[start..]) {
+                if !self.is_over {
+                    self.next_line = Some(row.split_off(start));
+                    self.last_line -= 1;
+                }
+                self.is_over = false;
+                return Err(RowFault::Rejected("a quotation mark is never closed".to_owned()));
             }
         }
         while matches!(row.last(), Some(b'\n' | b'\r')) {
@@ -236,22 +285,45 @@ impl<'a> Rows<'a> {
         }
         Ok(())
     }
+
+    /// Whether a line within a quotation mark is a row: it has as many cells, and begins with a value.
+    fn is_row(&self, line: &[u8]) -> bool {
+        let mut cells = Cells { bytes: line.to_vec(), ..Cells::default() };
+        cells.split(self.layout.separator);
+        let first = cells.text(0);
+        let first = first.trim();
+        let is_value = cell::is_value(first, DecimalSign::Either) || cell::is_moment(first);
+        let is_even = (self.layout.n_cells..=self.layout.n_cells + 1).contains(&cells.len());
+        is_even && !first.is_empty() && is_value
+    }
+
+    /// Returns why a row with these cells would be misread.
+    fn misfit<E>(&self, cells: &Cells) -> Option<RowFault<E>> {
+        let n = self.layout.n_cells;
+        let is_filled = |i: usize| cells.get(i).is_some_and(|cell| !cell::bare(cell).is_empty());
+        let has_more = !self.layout.may_have_more && (n..cells.len()).any(is_filled);
+        has_more.then(|| {
+            let found = cells.len();
+            let hint = if self.layout.separator == b',' {
+                "; numbers with decimal commas or thousands separators need quotes, or another separator"
+            } else {
+                ""
+            };
+            RowFault::Rejected(format!("{found} cells instead of {n}{hint}"))
+        })
+    }
 }
 
-impl RowSource for Rows<'_> {
-    /// Reads the next row that is neither blank nor a comment. The rows end where the source
-    /// cannot be read any further.
-    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault> {
+impl<E: From<io::Error>> RowSource<E> for Rows<'_> {
+    /// Reads the next row that is neither blank nor a comment.
+    fn next(&mut self, cells: &mut Cells) -> Result<bool, RowFault<E>> {
         while !self.is_over {
             self.line = self.last_line + 1;
-            if let Err(error) = self.row(&mut cells.bytes) {
-                self.is_over = true;
-                return Err(RowFault::Rejected(error.to_string()));
-            }
+            self.row(&mut cells.bytes)?;
             let bare = cell::bare(&cells.bytes);
-            if !bare.is_empty() && bare.first().copied() != self.comment {
-                cells.split(self.separator);
-                return Ok(true);
+            if !bare.is_empty() && bare.first().copied() != self.layout.comment {
+                cells.split(self.layout.separator);
+                return self.misfit(cells).map_or(Ok(true), Err);
             }
         }
         Ok(false)

@@ -135,7 +135,8 @@ fn a_batch_with_too_many_rows_is_rejected_as_a_whole() {
 fn the_valid_rows_of_a_csv_batch_are_accepted() {
     let text = b"t_s,cmd_qx_rad,cmd_qy_rad,x_m,y_m\n0,0,0,0,0\nx,0,0,0,0\n2,,,,\n";
     let batch = csv(text, LIMIT).unwrap();
-    assert_eq!(reasons(&batch), [(1, "line 3: `t_s`: `x` is not a number")]);
+    let time = "line 3: `t_s`: `x` is not a number; a time is in seconds, or as 2026-02-20 13:51:00.25 in all rows";
+    assert_eq!(reasons(&batch), [(1, time)]);
     assert_eq!(batch.rows.len(), 3);
     assert_eq!(batch.unknown, []);
 }

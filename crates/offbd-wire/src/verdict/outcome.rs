@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use super::{CandidateView, SummaryView, Verdict, candidate_view, warnings};
 use crate::words::{CodeWord, KindWord};
-use offbd_core::diagnosis::Suspicion;
+use offbd_core::diagnosis::{FaultMemory, Suspicion};
 use offbd_core::engine::{Misfit, MonitorState, Reach, State};
 use offbd_core::vocabulary::{FaultCode, PerAxis};
 
@@ -106,21 +106,37 @@ pub struct NamedKindView {
     pub kind: KindWord,
     /// Time at which it was first named, s on the device's clock.
     pub t_s: f64,
-    /// Its largest weight among the candidates, in (0, 1]; null if unknown.
+    /// Its weight among the candidates, in (0, 1]: of the last kind as in the fault's record, of
+    /// an earlier one the largest; null if unknown.
     pub weight: Option<f64>,
 }
 
 impl Verdict {
     /// Returns the result of each monitor, in the order of [`FaultCode::ALL`], of a session
-    /// that leaves the engine in `state`.
+    /// that leaves the engine in `state` and with `memory`.
     #[must_use]
-    pub fn monitors(&self, state: &State) -> Vec<JudgedView> {
-        let view = |(&code, monitor)| self.judged_view(code, monitor);
+    pub fn monitors(&self, state: &State, memory: &FaultMemory) -> Vec<JudgedView> {
+        let view = |(&code, monitor)| self.judged_view(code, monitor, memory);
         FaultCode::ALL.iter().zip(&state.monitors).map(view).collect()
     }
 
-    fn judged_view(&self, code: FaultCode, monitor: &MonitorState) -> JudgedView {
-        let suspected = self.suspected[code as usize].as_deref();
+    fn judged_view(
+        &self,
+        code: FaultCode,
+        monitor: &MonitorState,
+        memory: &FaultMemory,
+    ) -> JudgedView {
+        // The weights of the kinds change while a fault lasts; its record has the present ones.
+        let record = memory.record(code).suspicion.as_deref();
+        let record = record.filter(|_| self.confirmed.contains(&code));
+        let suspected = record.or(self.suspected[code as usize].as_deref());
+        let mut kinds = self.kinds(code);
+        if let Some(last) = kinds.last_mut()
+            && let Some(record) =
+                record.filter(|record| record.kind.map(Into::into) == Some(last.kind))
+        {
+            last.weight = record.kind_weight();
+        }
         let candidates = suspected.map(|s| s.candidates.iter().map(candidate_view).collect());
         JudgedView {
             code: code.into(),
@@ -128,7 +144,7 @@ impl Verdict {
             judged_share: monitor.judged_share,
             outcome: self.outcome(code, monitor.reach),
             candidates: candidates.unwrap_or_default(),
-            kinds: self.kinds(code),
+            kinds,
         }
     }
 
@@ -213,7 +229,7 @@ mod tests {
         let transition = Transition { at, code, status, byte, suspicion, evidence };
         let mut verdict = Verdict::default();
         verdict.take(0, &[transition]);
-        verdict.monitors(&State::default()).swap_remove(code as usize)
+        verdict.monitors(&State::default(), &FaultMemory::default()).swap_remove(code as usize)
     }
 
     #[test]
@@ -262,7 +278,8 @@ mod tests {
         take(3.0, FaultStatus::Confirmed, dead);
         take(4.0, FaultStatus::Confirmed, slow);
         take(5.0, FaultStatus::Confirmed, dead);
-        let monitor = verdict.monitors(&State::default()).swap_remove(code as usize);
+        let monitor =
+            verdict.monitors(&State::default(), &FaultMemory::default()).swap_remove(code as usize);
         let told: Vec<_> =
             monitor.kinds.iter().map(|k| (k.kind.as_str(), k.t_s, k.weight)).collect();
         assert_eq!(told, [("dead", 3.0, Some(0.5)), ("slow", 4.0, None)]);

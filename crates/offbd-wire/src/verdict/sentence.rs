@@ -3,7 +3,9 @@
 use super::kind_words::{code_title, code_words, fault_title, is_probable, status_words};
 use super::outcome::is_ambiguous;
 use crate::fault_kind::{Finding, answered_share, kind_text};
-use offbd_core::diagnosis::{AxisEvidence, Candidate, Evidence, Suspicion, Transition};
+use offbd_core::diagnosis::{
+    AxisEvidence, Candidate, Evidence, Profile, Settings, Suspicion, Transition,
+};
 use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus};
 
 /// Describes a transition in one sentence.
@@ -136,7 +138,19 @@ fn servo(axis: Axis, suspicion: &Suspicion, evidence: &Evidence) -> String {
     let probably = if is_probable(weight(suspicion)) { "probably " } else { "" };
     let along = axis.as_str();
     let answer = answer.map(|words| format!("the {along} servo {probably}{words}; "));
-    format!("{}{}", answer.unwrap_or_default(), accelerated(axis, e))
+    let shared = shared_cause(axis, evidence);
+    format!("{}{}{shared}", answer.unwrap_or_default(), accelerated(axis, e))
+}
+
+/// Names what both servos may have in common if there is evidence against both. Empty if there is not.
+fn shared_cause(axis: Axis, evidence: &Evidence) -> String {
+    let suspect_nats = Settings::of(Profile::Default).suspect_nats;
+    let suspected = |axis: Axis| evidence.axes[axis].nats >= suspect_nats;
+    if !Axis::ALL.into_iter().all(suspected) {
+        return String::new();
+    }
+    let other = axis.other().as_str();
+    format!("; the {other} servo deviates, too: measure their supply")
 }
 
 fn accelerated(axis: Axis, e: &AxisEvidence) -> String {

@@ -147,6 +147,19 @@ fn regress_a_still_ball_and_a_slow_ball_have_different_sentences() {
     );
 }
 
+/// Evidence against both servos points to what they share; less against one of them does not.
+#[test]
+fn a_supply_is_named_if_both_servos_deviate() {
+    let told = |nats: f64| {
+        let mut both = evidence();
+        both.axes.y.nats = nats;
+        findings_of(FaultCode::XServo, Some(FaultKind::Dead), both)
+    };
+    let supply = "; the y servo deviates, too: measure their supply";
+    assert!(told(10.0).ends_with(supply), "{}", told(10.0));
+    assert!(!told(9.9).contains("supply"), "{}", told(9.9));
+}
+
 #[test]
 fn regress_all_candidates_are_named_the_heaviest_first() {
     let servo = Candidate { code: FaultCode::XServo, kind: Some(FaultKind::Dead), weight: 0.7 };

@@ -1,10 +1,11 @@
-use super::super::motion::ASKED_M_S2;
+use super::motion::ASKED_M_S2;
 use super::*;
+use std::io::Cursor;
 
 /// A ball that rolls on a plate tilted by two sines, as an owner's program writes it: the columns
 /// `t`, `u`, `v`, `x`, `y` with these factors from seconds, radians and metres. The command `u`
 /// tilts about y.
-fn recording(header: &str, factors: [f64; 5]) -> std::io::Cursor<Vec<u8>> {
+fn recording(header: &str, factors: [f64; 5]) -> Cursor<Vec<u8>> {
     let mut text = format!("{header}\n");
     for i in 0..3000 {
         let t_s = f64::from(i) * 0.01;
@@ -13,7 +14,7 @@ fn recording(header: &str, factors: [f64; 5]) -> std::io::Cursor<Vec<u8>> {
         let row = row.iter().zip(factors).map(|(value, factor)| format!("{:.6}", value * factor));
         text += &(row.collect::<Vec<_>>().join(";") + "\n");
     }
-    std::io::Cursor::new(text.into_bytes())
+    Cursor::new(text.into_bytes())
 }
 
 fn inspected(header: &str, factors: [f64; 5], columns: &str) -> InspectionView {
@@ -102,7 +103,7 @@ fn both_coordinates_have_the_unit_that_the_motion_of_one_decides() {
         cells.join(";")
     };
     let text: Vec<String> = text.lines().enumerate().map(dead).collect();
-    let file = std::io::Cursor::new(text.join("\n").into_bytes());
+    let file = Cursor::new(text.join("\n").into_bytes());
     let view = inspect(file, &TableOptions::default()).unwrap();
     assert!(view.mapping.ends_with("x_m=x/cm, y_m=y/cm"), "{}", view.mapping);
     assert_eq!(quantity(&view, "x_m").reason.as_deref(), Some("as `y_m`"));
@@ -178,4 +179,31 @@ fn pixels_and_counts_are_not_lengths() {
     assert!(remarks(&view)[0].starts_with(told), "{:?}", view.remarks);
     let view = inspected(header, factors, "x_m=ball_x_px*0.0005, y_m=ball_y_px*0.0005");
     assert_eq!(remarks(&view), Vec::<String>::new());
+}
+
+#[test]
+fn dates_are_found_whatever_their_columns_are_called() {
+    for (names, first, mapping) in [
+        ("Datum;Uhrzeit", "20.02.2026;13:51:00,5", "t_s=Datum/s+Uhrzeit/s"),
+        ("Uhrzeit;Datum", "13:51:00,5;20.02.2026", "t_s=Datum/s+Uhrzeit/s"),
+        ("when;no", "20-Feb-2026 13:51:00;7", "t_s=when/s"),
+    ] {
+        let text = format!("{names};cmd_qy_rad;x_m\n{first};0,1;0,1\n{first};0,1;0,1\n");
+        let view = inspect(Cursor::new(text.into_bytes()), &TableOptions::default()).unwrap();
+        assert!(view.mapping.starts_with(mapping), "{names}: {}", view.mapping);
+        assert_eq!(view.rows, 2, "{names}");
+        let told = &view.remarks[view.remarks.len() - 1].text;
+        assert!(told.contains("1 of 2 rows have the time of the row before"), "{told}");
+    }
+}
+
+#[test]
+fn a_column_whose_name_another_one_has_is_written_by_its_number() {
+    let text = "t,x,q,x\n0,5,0,0.1\n1,5,0,0.2\n";
+    let options = TableOptions {
+        columns: "t_s=t, cmd_qy_rad=q, x_m=#4".parse().unwrap(),
+        ..TableOptions::default()
+    };
+    let view = inspect(Cursor::new(text), &options).unwrap();
+    assert_eq!(view.mapping, "t_s=t/s, cmd_qy_rad=q/rad, x_m=#4/m");
 }

@@ -1,25 +1,31 @@
 //! What a recording holds, as `offbd inspect` and a dry run of an import show it.
 
 mod check;
+mod motion;
 
 use std::io::{Read, Seek};
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::dialect::Dialect;
-use super::expression::ColumnMapping;
-use super::{CsvError, OpenedTable, TableOptions, find_table, guess};
+use crate::foreign_file::{self, HEAD_BYTES};
 use crate::session_csv::COLUMNS;
 use crate::session_file::{
-    self, ColumnFile, HEAD_BYTES, SessionFileError, SessionFormat, SessionRowError, SessionRows,
-    TextKind, TextRows,
+    self, ColumnFile, SessionFileError, SessionFormat, SessionRowError, SessionRows, TextKind,
+    TextRows,
+};
+use crate::table::{
+    ColumnMapping, CsvError, DecimalSign, Dialect, OpenedTable, TableOptions, find_table, guess,
 };
 use crate::telemetry::{SampleView, sample_view};
 use offbd_core::vocabulary::Sample;
 
 /// Rows by which the motion is compared with the commands. Chosen: half an hour at 100 Hz.
 const COMPARED_ROWS: usize = 180_000;
+
+/// Share of rows with the time of the row before that is worth a remark. Chosen: a device that sends
+/// some rows twice has fewer.
+const MANY_REPEATED: f64 = 0.1;
 
 /// Rows that are shown, and rejected rows that are named.
 const SHOWN_ROWS: usize = 5;
@@ -135,7 +141,7 @@ pub fn inspect(
     let mut head = Vec::new();
     source.by_ref().take(HEAD_BYTES).read_to_end(&mut head)?;
     source.rewind()?;
-    session_file::check_own(&head)?;
+    foreign_file::check_own(&head)?;
     let format = SessionFormat::of(&head);
     let mut view = InspectionView { format: format.to_string(), ..InspectionView::default() };
     #[cfg(feature = "xlsx")]
@@ -219,17 +225,17 @@ fn inspect_table(
             "pixels and counts need a factor and an offset, such as `x_m={first}*0.0005-0.16`: {all}"
         ));
     }
-    let mut samples = read_table(&mut view, table, &mapping, rate_hz)?;
+    let mut read = read_table(&mut view, table, &mapping, rate_hz)?;
     let before = mapping.clone();
-    check::by_motion(&mut view, &dialect.names, &mut mapping, &mut guesses, &samples);
+    check::by_motion(&mut view, &dialect.names, &mut mapping, &mut guesses, &read.samples);
     if mapping != before {
         view.forget_rows();
-        samples = read_table(&mut view, table, &mapping, rate_hz)?;
+        read = read_table(&mut view, table, &mapping, rate_hz)?;
     }
     if !(options.columns.is_empty() && guesses.is_empty()) {
         view.mapping = mapping.with_names(&dialect.names).to_string();
     }
-    show(&mut view, &samples, |quantity| {
+    show(&mut view, &read, |quantity| {
         let guess = guesses.iter().find(|guess| guess.quantity == quantity);
         let expression = mapping.expressions[quantity].as_ref();
         let text = expression.map(|e| e.with_names(&dialect.names).text(quantity));
@@ -250,39 +256,58 @@ impl InspectionView {
     }
 }
 
+/// Rows as they are read.
+#[derive(Default)]
+struct ReadRows {
+    /// The first [`COMPARED_ROWS`] samples of the first run.
+    samples: Vec<Sample>,
+    /// Smallest and largest value of each of the [`COLUMNS`], of all rows.
+    ranges: [Option<(f64, f64)>; COLUMNS.len()],
+}
+
+impl ReadRows {
+    fn add(&mut self, sample: Sample, is_compared: bool) {
+        let Sample { t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, .. } = sample;
+        let values = [Some(t_s), cmd_qx_rad, cmd_qy_rad, x_m, y_m];
+        for (range, value) in self.ranges.iter_mut().zip(values) {
+            let Some(value) = value else { continue };
+            let (from, to) = range.unwrap_or((value, value));
+            *range = Some((from.min(value), to.max(value)));
+        }
+        if is_compared && self.samples.len() < COMPARED_ROWS {
+            self.samples.push(sample);
+        }
+    }
+}
+
 /// Reads the rows of a table by `mapping`; no sample if a column is missing.
 fn read_table(
     view: &mut InspectionView,
     table: &mut (impl Reopened + ?Sized),
     mapping: &ColumnMapping,
     rate_hz: Option<f64>,
-) -> Result<Vec<Sample>, SessionFileError> {
+) -> Result<ReadRows, SessionFileError> {
     let options = TableOptions { columns: mapping.clone(), rate_hz, ..TableOptions::default() };
     match table.rows(&options) {
         Ok(mut rows) => read(view, &mut rows),
         Err(SessionFileError::Csv(CsvError::MissingColumn { name, .. })) => {
             view.remark(format!("no column is likely to be `{name}`; map one"));
-            Ok(Vec::new())
+            Ok(ReadRows::default())
         }
         Err(error) => Err(error),
     }
 }
 
-/// Shows the quantities of `samples`, each with its expression and the reason of a guess, and the
+/// Shows the quantities of the rows, each with its expression and the reason of a guess, and the
 /// motion.
 fn show(
     view: &mut InspectionView,
-    samples: &[Sample],
+    ReadRows { samples, ranges }: &ReadRows,
     stated: impl Fn(usize) -> (Option<String>, Option<String>),
 ) {
-    let value = |sample: &Sample, quantity: usize| {
-        let Sample { t_s, cmd_qx_rad, cmd_qy_rad, x_m, y_m, .. } = *sample;
-        [Some(t_s), cmd_qx_rad, cmd_qy_rad, x_m, y_m][quantity]
-    };
     for (quantity, name) in COLUMNS.into_iter().enumerate() {
-        let values = || samples.iter().filter_map(|sample| value(sample, quantity));
         let (expression, reason) = stated(quantity);
-        let (from, to) = (values().reduce(f64::min), values().reduce(f64::max));
+        let (from, to) = ranges[quantity].unzip();
         view.quantities.push(InspectedQuantityView {
             quantity: name.to_owned(),
             expression,
@@ -312,7 +337,7 @@ fn layout(view: &mut InspectionView, table: &OpenedTable<'_>) {
         let encoding = table.encoding.replace("windows", "Windows");
         view.layout.push(format!("{encoding}, separated by {separator}"));
     }
-    if dialect.has_decimal_commas {
+    if dialect.decimal == DecimalSign::Comma {
         view.layout.push("decimal commas".to_owned());
     }
     if dialect.n_preamble > 0 {
@@ -391,13 +416,13 @@ impl Steps {
     }
 }
 
-/// Counts the rows; returns the first [`COMPARED_ROWS`] samples of the first run.
+/// Counts the rows.
 fn read(
     view: &mut InspectionView,
     rows: &mut dyn SessionRows,
-) -> Result<Vec<Sample>, SessionFileError> {
-    let mut samples: Vec<Sample> = Vec::new();
-    let (mut n_blind, mut steps) = (0_u64, Steps::default());
+) -> Result<ReadRows, SessionFileError> {
+    let mut read = ReadRows::default();
+    let (mut n_blind, mut n_repeated, mut steps) = (0_u64, 0_u64, Steps::default());
     while let Some(row) = rows.next() {
         let sample = match row {
             Err(SessionRowError::Unreadable(error)) => return Err(error),
@@ -415,13 +440,12 @@ fn read(
         view.from_s.get_or_insert(sample.t_s);
         if let Some(last) = view.to_s.replace(sample.t_s) {
             steps.add(sample.t_s - last);
+            n_repeated += u64::from(sample.t_s == last);
         }
         if view.first.len() < SHOWN_ROWS {
             view.first.push(sample_view(&sample));
         }
-        if samples.len() < COMPARED_ROWS && rows.n_runs() == 1 {
-            samples.push(sample);
-        }
+        read.add(sample, rows.n_runs() == 1);
     }
     if steps.median_s.is_none() {
         steps.settle();
@@ -430,7 +454,14 @@ fn read(
     view.without_ball = if view.rows > 0 { n_blind as f64 / view.rows as f64 } else { 0.0 };
     view.rate_hz = steps.median_s.map(|median| 1.0 / median);
     (view.gaps, view.longest_gap_s) = (steps.n_gaps, steps.longest_s);
-    Ok(samples)
+    if n_repeated as f64 > MANY_REPEATED * view.rows as f64 {
+        let n = view.rows;
+        view.remark(format!(
+            "{n_repeated} of {n} rows have the time of the row before and would be rejected; if the \
+             clock is coarser than the rows, leave it out with `t_s=none` and give the rate"
+        ));
+    }
+    Ok(read)
 }
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! Whether the columns and units of a mapping agree with the motion.
 
-use super::super::columns::{AXES, Axis};
-use super::super::expression::{ColumnMapping, Dimension, Expression};
-use super::super::guess::Guess;
-use super::super::motion::{self, ASKED_M_S2, Motion};
+use super::motion::{self, ASKED_M_S2, Motion};
 use super::{InspectionRemarkView, InspectionView, MappingChangeView};
 use crate::session_csv::COLUMNS;
+use crate::table::guess::Guess;
+use crate::table::{AXES, Axis, ColumnMapping, Dimension, Expression};
 use offbd_core::vocabulary::Sample;
 
 /// Smallest correlation by which the motion decides a sign, an axis or a unit. Chosen: below it
