@@ -4,6 +4,7 @@
 mod blocks;
 mod bounds;
 mod changes;
+mod circles;
 mod documents;
 mod english;
 mod links;

@@ -10,6 +10,27 @@ async fn fault(client: &Client, asset: &str, code: &str) -> Value {
     client.get(&format!("assets/{asset}/faults/{code}")).await.expect(200)
 }
 
+/// The weight of a kind changes while its fault lasts: everywhere it is the present one.
+#[tokio::test]
+async fn a_session_and_its_fault_give_a_kind_the_same_weight() {
+    let fixture = ServiceFixture::start().await;
+    let client = &fixture.client;
+    client.asset("a").await;
+    client.telemetry("a", Some("s"), &rig(1500, 300)).await;
+    let session = client.end("a", "s").await;
+    let of_session = session["verdict"]["monitors"][0].clone();
+    let faults = client.get("assets/a/faults?status=all").await.expect(200);
+    let faults = faults["items"].as_array().unwrap();
+    let of_fault = faults.iter().find(|fault| fault["code"] == "x_servo").unwrap();
+    assert_eq!(of_session["code"], "x_servo");
+    assert_eq!(of_session["candidates"], of_fault["candidates"], "{session}\n{of_fault}");
+    let kinds = of_session["kinds"].as_array().unwrap();
+    let last = &kinds[kinds.len() - 1];
+    let candidates = of_fault["candidates"].as_array().unwrap();
+    let present = candidates.iter().find(|candidate| candidate["kind"] == last["kind"]).unwrap();
+    assert_eq!(last["weight"], present["weight"], "{of_session}");
+}
+
 #[tokio::test]
 async fn the_version_of_sovd_leads_to_the_rigs() {
     let fixture = ServiceFixture::start().await;

@@ -66,7 +66,10 @@ fn summary_after(
         verdict.take(engine.n_accepted(), &transitions);
     }
     let summary = verdict.summary("s", samples.len() as u64, 0, 0.0);
-    (summary.with_monitors(verdict.monitors(&engine.state())), engine.memory().clone())
+    (
+        summary.with_monitors(verdict.monitors(&engine.state(), engine.memory())),
+        engine.memory().clone(),
+    )
 }
 
 fn summary(setup: &Setup, samples: &[Sample]) -> SummaryView {
@@ -157,6 +160,22 @@ fn a_ball_at_rest_leaves_servos_and_ball_not_judged() {
     assert!(shares(&found)[..3].iter().all(|&share| share < 0.05), "{found:?}");
     assert!(shares(&found)[3] > 0.9);
     assert_eq!(found.outcome, Some(Outcome::PartlyJudged));
+}
+
+/// Of a time in which the sensor hides what the servos do, nobody says that there was no fault.
+#[test]
+fn servos_are_not_judged_under_a_sensor_that_stays_broken() {
+    use Outcome::{Fault, NoFault, NotJudged};
+    let setup = learnt(Preset::Chapter);
+    let of = |fault: &str| {
+        let samples = session(Preset::Chapter, Reference::Steps, 60.0, 9, fault);
+        summary(&setup, &samples)
+    };
+    let lasting = of("sensor:spikes@20");
+    assert_eq!(outcomes(&lasting), [NotJudged, NotJudged, NotJudged, Fault], "{lasting:?}");
+    assert!(shares(&lasting)[0] > 0.2, "it was judged before: {lasting:?}");
+    let repaired = of("sensor:spikes@20-30");
+    assert_eq!(outcomes(&repaired), [NoFault, NoFault, NoFault, Fault], "{repaired:?}");
 }
 
 /// The debounce setting also applies to the sensor, and a jump of the readings counts as a

@@ -8,8 +8,8 @@ use std::time::Duration;
 use hyper::StatusCode;
 use serde::Deserialize;
 
+use super::batch::NewBatch;
 use super::parsed;
-use super::spool::NewBatch;
 use offbd_wire::problem::PROBLEM_TYPE;
 use offbd_wire::telemetry::{AckView, RowsView, sample_view};
 

@@ -8,9 +8,9 @@ use futures_util::TryStreamExt;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteLockingMode};
 use sqlx::{ConnectOptions, Connection, Row};
 
+use super::batch::{NewBatch, SpoolError};
 use super::files::with_ending;
 use super::log::{self, Log};
-use super::spool::{NewBatch, SpoolError};
 
 /// What a database of SQLite begins with.
 const MAGIC: [u8; 16] = *b"SQLite format 3\0";

@@ -14,8 +14,9 @@ use hyper::{Request, Uri};
 use tokio::time::{sleep, timeout};
 
 use super::answer::{Attempt, Failure, meaning};
+use super::batch::{NewBatch, SpoolError};
 use super::delays::{Delays, Due, LONGEST_DELAY, MAX_AT_ONCE};
-use super::spool::{NewBatch, Spool, SpoolError, WaitingBatch};
+use super::spool::{Spool, WaitingBatch};
 use offbd_net::{HttpsClient, Reasons, https_client};
 
 /// Longest wait for an answer; then the batch is sent again.

@@ -15,9 +15,10 @@ use serde::Serialize;
 use tokio::time::timeout;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 
+use super::batch::NewBatch;
 use super::delays::{DelayView, Delays};
 use super::refusal::{self, Refusal};
-use super::spool::{NewBatch, Spool, SpoolStatus};
+use super::spool::{Spool, SpoolStatus};
 use super::strangers;
 use offbd_net::coding::{BodyError, Coding};
 use offbd_net::unread_body;
@@ -26,7 +27,7 @@ use offbd_wire::telemetry::{AckView, Batch, RowView, TelemetryFormat};
 /// Longest body as it arrives, and decompressed, bytes; a longer one is refused with 413.
 const MAX_BODY_BYTES: usize = 4 << 20;
 /// Longest time until a body has arrived; then it is refused with 408.
-pub(super) const BODY_TIMEOUT: Duration = Duration::from_secs(30);
+const BODY_TIMEOUT: Duration = Duration::from_secs(30);
 /// Most samples of a batch; more are refused with 413. The default limit of the service.
 pub(super) const MAX_BATCH_SAMPLES: usize = 10_000;
 
@@ -73,7 +74,7 @@ async fn take(
     let format = TelemetryFormat::of_type(&media_type)?;
     let coding = Coding::of(request.headers())?;
     let body = timeout(BODY_TIMEOUT, collect(coding, request.into_body())).await;
-    let body = body.map_err(|_| Refusal::SlowBody)??;
+    let body = body.map_err(|_| Refusal::SlowBody(BODY_TIMEOUT))??;
     let parsed = format.parse(&body, MAX_BATCH_SAMPLES)?;
     Rig::chapter(&asset).check()?;
     let query = query.unwrap_or_default();

@@ -8,6 +8,7 @@
 //! stay in the spool, with the reason, until a person sends them again or deletes them.
 
 mod answer;
+mod batch;
 pub mod command;
 mod database;
 mod delays;
@@ -26,12 +27,13 @@ mod strangers;
 
 use offbd_wire::telemetry::{Batch, TelemetryFormat};
 
+pub use batch::{NewBatch, SpoolError};
 pub use delays::Delays;
 pub use delivery::{InvalidServiceUrl, ServiceUrl, SpoolSender};
 pub use intake::router;
 pub use lines::{LineFormat, spool_lines};
 pub use source::Lines;
-pub use spool::{MAX_SPOOL_BYTES, NewBatch, RefusedBatch, Spool, SpoolError, SpoolStatus};
+pub use spool::{MAX_SPOOL_BYTES, RefusedBatch, Spool, SpoolStatus};
 
 /// Parses a batch, as the service does.
 fn parsed(batch: &NewBatch) -> Result<Batch, String> {

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use tokio::time::{sleep, timeout};
 
+use super::batch::{NewBatch, SpoolError};
 use super::parsed;
 use super::source::Lines;
-use super::spool::{NewBatch, Spool, SpoolError};
+use super::spool::Spool;
 use super::stop::Stop;
 use offbd_net::Reasons;
 

@@ -16,10 +16,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::spool::{NewBatch, SpoolError};
+use super::batch::{NewBatch, SpoolError, VERSION};
 
-/// Version of the format. Version 1 was a database of SQLite.
-pub(super) const VERSION: u32 = 2;
 /// What the file begins with, and once more in its second block.
 const MAGIC: [u8; 16] = *b"offbd spool\0\0\0\0\0";
 const FILE_HEADER_BYTES: usize = 32;

@@ -1,5 +1,7 @@
 //! What the agent answers instead of an acknowledgement: problems (RFC 9457), as of the service.
 
+use std::time::Duration;
+
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::StatusCode;
@@ -13,8 +15,7 @@ use offbd_wire::telemetry::{BatchError, UnsupportedMediaType};
 use serde_json::{Value, json};
 use tower_http::request_id::RequestId;
 
-use super::intake::BODY_TIMEOUT;
-use super::spool::SpoolError;
+use super::batch::SpoolError;
 
 /// When a device may try again while the spool takes no more, s.
 const RETRY_AFTER_S: u16 = 5;
@@ -34,8 +35,8 @@ pub(super) enum Refusal {
     Coding(#[from] UnsupportedCoding),
     #[error(transparent)]
     Body(#[from] BodyError),
-    #[error("the body was not received in {} s", BODY_TIMEOUT.as_secs())]
-    SlowBody,
+    #[error("the body was not received in {} s", .0.as_secs())]
+    SlowBody(Duration),
     #[error("`Host` must be an IP address, localhost, or a name that is given with --host")]
     Host,
     #[error("the request comes from a page of another site")]
@@ -51,7 +52,7 @@ impl Refusal {
             Self::Coding(_) => problem::CONTENT_CODING,
             Self::Body(BodyError::TooLong { .. }) => problem::TOO_LARGE,
             Self::Body(_) => problem::MALFORMED,
-            Self::SlowBody => problem::SLOW_BODY,
+            Self::SlowBody(_) => problem::SLOW_BODY,
             Self::Host => problem::MISDIRECTED,
             Self::Origin => problem::FORBIDDEN,
             Self::Asset(_) => problem::INVALID,

@@ -8,57 +8,13 @@ use serde::Serialize;
 use tokio::sync::Notify;
 use tokio::task::spawn_blocking;
 
+use super::batch::{NewBatch, SpoolError};
 use super::log::{self, BLOCK, Log};
 use super::reserve::{RESERVE_BYTES, Reserve};
 
 /// Default of the most bytes of batches that a spool holds; further ones are refused with 429.
 /// Chosen: ten hours of one rig at 100 Hz as JSON.
 pub const MAX_SPOOL_BYTES: u64 = 512 << 20;
-
-/// Why a spool cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum SpoolError {
-    /// Nothing of the batch was taken.
-    #[error("the spool is full: {used} of {limit} bytes wait for the service")]
-    Full { used: u64, limit: u64 },
-    /// Nothing of the batch was taken.
-    #[error("the disk is full")]
-    DiskFull,
-    #[error("the spool is locked by an agent that is running")]
-    Locked,
-    /// Nothing was changed.
-    #[error("no batch {0} is set aside")]
-    NotSetAside(i64),
-    /// Nothing was changed.
-    #[error("batch {0} is damaged and cannot be sent; remove it")]
-    Damaged(i64),
-    #[error("the spool has the format {0} of a later version of offbd; this one knows {current}", current = log::VERSION)]
-    Later(i64),
-    /// Nothing was changed.
-    #[error("the file is not a spool")]
-    Foreign,
-    #[error("the spool cannot be used: {0}")]
-    File(#[from] io::Error),
-    #[error("the spool of an earlier version cannot be read: {0}")]
-    Sql(#[from] sqlx::Error),
-}
-
-impl SpoolError {
-    fn is_of_full_disk(&self) -> bool {
-        use io::ErrorKind::{QuotaExceeded, StorageFull};
-        matches!(self, Self::File(error) if matches!(error.kind(), StorageFull | QuotaExceeded))
-    }
-}
-
-/// A batch as a device has sent it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NewBatch {
-    pub asset: String,
-    /// The query of the request, without the question mark.
-    pub query: String,
-    pub media_type: String,
-    pub body: Vec<u8>,
-}
 
 /// A batch that waits.
 #[derive(Clone, Debug, PartialEq, Eq)]

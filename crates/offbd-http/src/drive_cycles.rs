@@ -13,8 +13,8 @@ use offbd_wire::session_file::SessionFormat;
 
 /// Returns the drive cycle of a calibrated rig: the shortest motion, within the plate and
 /// the servo limits, in which every monitor completes and every detectable fault is
-/// detected. JSON, or only its rows as CSV if `Accept` prefers `text/csv`. It is computed
-/// for each request, which takes up to several seconds.
+/// detected. JSON, or only its rows as CSV if `Accept` prefers `text/csv`. Its computation
+/// takes up to several seconds; the last one is kept.
 #[utoipa::path(get, path = "/assets/{asset}/drive-cycle", tag = "assets",
     operation_id = "get_drive_cycle",
     params(("asset" = String, description = "Name of the asset")),

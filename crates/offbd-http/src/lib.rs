@@ -62,7 +62,7 @@ mod trials;
 mod web_socket;
 
 use std::str::FromStr;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use axum::extract::{FromRef, FromRequestParts};
 use axum::http::request::Parts;
@@ -71,7 +71,7 @@ use serde::Deserialize;
 use tokio_util::sync::CancellationToken;
 use utoipa::OpenApi;
 use utoipa::openapi::OpenApi as Document;
-use utoipa_swagger_ui::SwaggerUi;
+use utoipa_swagger_ui::{Config, SwaggerUi};
 
 pub use asyncapi::asyncapi_yaml;
 pub use body::BodyBudget;
@@ -293,22 +293,14 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
     let (router, mut document) = api().split();
     let (extra, described) = extra.split();
     document.merge(described);
-    let document = description::complete(document);
     let mut rules = RouteRules::new(&document);
     OPEN_PAGES.iter().for_each(|path| rules.open(path));
-    let yaml = document.to_yaml().unwrap_or_default();
     let policy = app.policy.clone();
     let forwarder = Forwarder::default();
     let guard = Arc::new(Guard { app: app.clone(), rules, forwarder: forwarder.clone() });
-    let router = router
-        .route("/openapi.yaml", operations::document("application/yaml", yaml))
-        .route("/asyncapi.yaml", operations::document("application/yaml", asyncapi_yaml()))
-        .route(
-            "/asset.schema.json",
-            operations::document("application/schema+json", asset_schema()),
-        )
+    let router = with_documents(router, document)
         .merge(
-            Router::<App>::from(SwaggerUi::new("/docs").url("/openapi.json", document))
+            Router::<App>::from(SwaggerUi::new("/docs").config(Config::from("/openapi.json")))
                 .layer(axum::middleware::map_response(page::named_docs)),
         )
         .fallback(page::serve)
@@ -318,4 +310,23 @@ pub fn router(app: App, extra: ExtraRoutes) -> Router {
         .layer(Extension(forwarder))
         .layer(axum::middleware::from_fn_with_state(guard, guard::guard));
     layers::add(router, &policy)
+}
+
+/// Adds the documents that describe the interface. Each is built when it is first read.
+fn with_documents(router: Router<App>, document: Document) -> Router<App> {
+    use operations::document as served;
+
+    let complete = Arc::new(LazyLock::new(move || description::complete(document)));
+    let json = Arc::clone(&complete);
+    router
+        .route(
+            "/openapi.yaml",
+            served("application/yaml", move || complete.to_yaml().unwrap_or_default()),
+        )
+        .route(
+            "/openapi.json",
+            served("application/json", move || json.to_json().unwrap_or_default()),
+        )
+        .route("/asyncapi.yaml", served("application/yaml", asyncapi_yaml))
+        .route("/asset.schema.json", served("application/schema+json", asset_schema))
 }

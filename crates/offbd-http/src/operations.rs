@@ -1,5 +1,7 @@
 //! Health, readiness and the descriptions of the interface.
 
+use std::sync::{Arc, LazyLock};
+
 use axum::Json;
 use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
@@ -64,8 +66,11 @@ pub(super) async fn readyz(State(app): State<App>) -> Result<Json<HealthView>, P
     Ok(healthy(&app))
 }
 
-/// Returns the route of a document that does not change.
-pub(super) fn document(media_type: &'static str, text: String) -> MethodRouter<App> {
-    let text = Bytes::from(text);
-    axum::routing::get(async move || ([(CONTENT_TYPE, media_type)], text.clone()))
+/// Returns the route of a document that does not change. It is built when it is first read.
+pub(super) fn document(
+    media_type: &'static str,
+    text: impl FnOnce() -> String + Send + 'static,
+) -> MethodRouter<App> {
+    let text = Arc::new(LazyLock::new(|| Bytes::from(text())));
+    axum::routing::get(async move || ([(CONTENT_TYPE, media_type)], Bytes::clone(&text)))
 }

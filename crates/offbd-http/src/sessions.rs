@@ -22,9 +22,10 @@ use super::{
 };
 use offbd_core::vocabulary::{Invalid, in_range};
 use offbd_service::{RecordingReader, Route, Service, ServiceError, SessionListQuery};
+use offbd_wire::inspection::InspectionView;
 use offbd_wire::service::{ImportView, Page, SessionCalibrationView, SessionView};
 use offbd_wire::session_file::{SessionFormat, SessionWriter};
-use offbd_wire::table::{InspectionView, RATES_HZ, TableOptions};
+use offbd_wire::table::{RATES_HZ, TableOptions};
 use offbd_wire::verdict::FaultView;
 use offbd_wire::words::{SessionSort, SessionState, VerdictFilter};
 

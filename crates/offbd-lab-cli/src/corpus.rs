@@ -7,7 +7,7 @@ use anyhow::Context;
 use rayon::prelude::*;
 
 use super::labels::{Label, class, labelled};
-use super::simulate::write_session;
+use super::session::write_session;
 use offbd_core::vocabulary::Axis;
 use offbd_file_cli::calibrate::write_asset;
 use offbd_file_cli::replay::progress;

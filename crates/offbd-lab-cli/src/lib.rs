@@ -6,6 +6,7 @@ mod corpus;
 mod labels;
 mod scene;
 mod score;
+mod session;
 pub mod simulate;
 mod soak;
 

@@ -10,16 +10,16 @@ use clap::Args;
 
 use super::corpus;
 use super::labels::{Label, class, labelled};
+use super::session::write_session;
 use offbd_core::vocabulary::{Axis, Invalid, Sample};
 use offbd_file_cli::calibrate::write_asset;
-use offbd_file_cli::judge;
+use offbd_file_cli::{judge, recordings};
 use offbd_lab::simulation::{
     BallFault, Fault, Preset, Reference, RigModel, SensorFault, ServoFault, SimulatedRig,
     Transport, Variety,
 };
 use offbd_terminal::errors::BadArgument;
 use offbd_terminal::output::{self, value_parser};
-use offbd_wire::session_csv;
 use options::{LineArgs, RigArgs, SensorArgs};
 
 /// Simulates a session of a rig: PID control, servos, noise, faults.
@@ -142,14 +142,6 @@ pub(super) fn run(args: &SimulateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Writes a session, with the column `seq` if `seq` is true.
-pub(super) fn write_session(path: &Path, samples: &[Sample], seq: bool) -> anyhow::Result<()> {
-    let mut out = output::create(path)?;
-    let unnumbered = |s: &Sample| Sample { seq: s.seq.filter(|_| seq), ..*s };
-    session_csv::write(&mut out, &samples.iter().map(unnumbered).collect::<Vec<_>>())?;
-    Ok(out.flush()?)
-}
-
 fn write_truth(path: &Path, label: &Label) -> anyhow::Result<()> {
     let mut out = output::create(path)?;
     serde_json::to_writer_pretty(&mut out, label)?;
@@ -197,7 +189,7 @@ impl SimulateArgs {
     fn label(&self, rig: &SimulatedRig, name: &str, rows: usize) -> Label {
         let first = rig.faults().next();
         Label {
-            file: judge::session_name(&self.output),
+            file: recordings::session_name(&self.output),
             rig: name.to_owned(),
             motion: self.reference.to_string(),
             seconds: self.seconds,

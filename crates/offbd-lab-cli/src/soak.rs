@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
-use super::simulate::write_session;
+use super::session::write_session;
 use counts::SoakCounts;
 use offbd_core::engine::{CannotCalibrate, Setup, calibrate};
 use offbd_core::vocabulary::{Invalid, Sample};
@@ -50,6 +50,9 @@ pub struct SoakArgs {
     /// Accepted false alarms per rig and year [default: that of the diagnosis]
     #[arg(long, value_name = "N")]
     per_year: Option<f64>,
+    /// How long a failure must last before a test fails, s [default: that of the diagnosis]
+    #[arg(long, value_name = "S")]
+    debounce: Option<f64>,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -161,6 +164,7 @@ fn calibrated(
         Err(refusal) => return Ok(Err(refusal)),
     };
     rig.diagnostics.false_alarms_per_rig_year = args.per_year;
+    rig.diagnostics.debounce_s = args.debounce;
     Setup::new(rig, None).map(Ok).map_err(cannot)
 }
 

@@ -1,7 +1,7 @@
 //! Starts the service and its threads and tasks.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, Weak};
 
 use futures_util::{StreamExt, stream};
 use tokio::sync::{Notify, Semaphore, mpsc, watch};
@@ -19,10 +19,15 @@ use super::limits::{MAX_DRIVE_CYCLES, MAX_IMPORTS, MAX_RECORDINGS, MAX_TRACES, M
 use super::mutes::Mutes;
 use super::notifications::{NotificationTransport, Notifier};
 use super::ownership::Ownership;
+use super::requests::LastSearch;
 use super::upkeep::{Deleter, Upkeep, Watchdog};
 use super::writing::{Committer, Events, FIRST_RETRY, Handles, Pace, Transfers};
 use super::{Clock, Limits, Reasons, ServiceError, snapshots};
 use offbd_store::{MAX_PARTITIONS, NodeIdentity, PartitionId, Store, Write, Writer};
+
+/// Take-overs whose work waits to be continued. If there are more, the jobs of a partition
+/// stay queued until its next owner.
+const MAX_RESUMED: usize = 1024;
 
 /// A handle to the running service. Cheap to clone; all clones share one service.
 #[derive(Clone)]
@@ -62,6 +67,7 @@ pub(super) struct Computing {
     pub(super) traces: Arc<Semaphore>,
     pub(super) whole_traces: Arc<Semaphore>,
     pub(super) drive_cycles: Arc<Semaphore>,
+    pub(super) last_drive_cycle: Mutex<LastSearch>,
     pub(super) imports: Arc<Semaphore>,
 }
 
@@ -73,6 +79,7 @@ impl Computing {
             traces: permits(MAX_TRACES),
             whole_traces: permits(MAX_WHOLE_TRACES),
             drive_cycles: permits(MAX_DRIVE_CYCLES),
+            last_drive_cycle: Mutex::default(),
             imports: permits(MAX_IMPORTS),
         }
     }
@@ -156,7 +163,7 @@ impl Parts {
             workers.jobs.push(tokio::spawn(loader.run()));
             workers.jobs.extend(upkeep.spawn());
             let is_node = node.is_some();
-            workers.jobs.extend(node.into_iter().flat_map(|node| cluster::spawn(node, &service)));
+            workers.jobs.extend(node.into_iter().flat_map(|node| service.spawn_node(node)));
             workers.jobs.push(tokio::spawn(communication.run()));
             // A node does so for each partition that it takes.
             if is_node { Ok(()) } else { service.resume_jobs(None).await }
@@ -235,6 +242,15 @@ impl Service {
     ) -> Result<(Self, Workers), ServiceError> {
         let (service, parts) = Self::assemble(store, writer, limits, provider, None, Clock::System);
         parts.start(service).await
+    }
+
+    /// Starts the tasks of a node of a cluster.
+    fn spawn_node(&self, node: NodeTask) -> Vec<JoinHandle<()>> {
+        let (resume, taken) = mpsc::channel(MAX_RESUMED);
+        let closing = self.inner.handles.closing.clone();
+        let mut tasks = cluster::spawn(node, &self.inner.events, resume);
+        tasks.push(tokio::spawn(resume_taken(Arc::downgrade(&self.inner), taken, closing)));
+        tasks
     }
 
     /// Starts the service as the node `me` of a cluster. It takes partitions by and by.
@@ -378,5 +394,22 @@ impl Service {
             tracing::info!(n_assets = behind.len(), "all engines are rebuilt");
         }
         Ok(())
+    }
+}
+
+/// Continues the work of the former owners of partitions that were taken: interrupted
+/// imports are discarded, jobs queued again, and engines that are far behind rebuilt.
+async fn resume_taken(
+    service: Weak<Inner>,
+    mut taken: mpsc::Receiver<Vec<PartitionId>>,
+    closing: CancellationToken,
+) {
+    while let Some(Some(partitions)) = closing.run_until_cancelled(taken.recv()).await {
+        let Some(inner) = service.upgrade() else { return };
+        let service = Service { inner };
+        let resume = service.resume(Some(&partitions));
+        if let Some(Err(error)) = closing.run_until_cancelled(resume).await {
+            tracing::error!(%error, "cannot continue the work of partitions that were taken");
+        }
     }
 }

@@ -36,6 +36,20 @@ fn the_help_of_each_command_has_an_example_and_fits_in_eighty_columns() {
 }
 
 #[test]
+fn the_service_and_the_output_have_the_same_options_everywhere() {
+    let cli = CliFixture::new();
+    for (option, commands) in [
+        ("--url <", &["watch", "forward"][..]),
+        ("-o, --output <", &["calibrate", "simulate", "backup", "export", "drive-cycle"]),
+    ] {
+        for command in commands {
+            let help = cli.ok(&format!("{command} --help")).stdout;
+            assert!(help.contains(option), "{command} lacks {option}: {help}");
+        }
+    }
+}
+
+#[test]
 fn the_long_version_has_the_commit_and_the_features() {
     let cli = CliFixture::new();
     let version = concat!("offbd ", env!("CARGO_PKG_VERSION"), "\n");

@@ -4,7 +4,7 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock};
 
 const MISSING: &str = "no `initdb` of PostgreSQL in PATH or /usr/lib/postgresql/*/bin: install \
     `postgresql`, or set POSTGRES_PROGRAMS to the directory that has it";
@@ -64,13 +64,7 @@ impl Postgres {
             let owner = Command::new("chown").arg("nobody").arg(&directory).status().unwrap();
             assert!(owner.success());
         }
-        let made = as_nobody(programs().join("initdb"))
-            .args(["--username=offbd", "--auth=trust", "--encoding=UTF8", "--locale=C"])
-            .args(["--locale-provider=icu", "--icu-locale=en-US", "--no-sync", "-D"])
-            .arg(&directory)
-            .output()
-            .unwrap();
-        assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+        fill(&directory);
         let mut server = Self { directory, tcp_port, running: None };
         server.start();
         server
@@ -153,6 +147,39 @@ pub fn shared_database(name: &str) -> String {
         directory
     });
     database(directory, name)
+}
+
+/// Makes the data of a new server in the empty `directory`: a copy of those of an earlier one.
+fn fill(directory: &Path) {
+    static MADE: Mutex<()> = Mutex::new(());
+    let _one_at_a_time = MADE.lock().unwrap();
+    let version = Command::new(programs().join("postgres")).arg("--version").output().unwrap();
+    let version = String::from_utf8(version.stdout).unwrap().replace([' ', '\n', '/'], "-");
+    let made = Path::new(env!("CARGO_TARGET_TMPDIR")).join(version);
+    if !made.exists() {
+        initialise(directory);
+        // Whole, or not there.
+        let copy = made.with_extension(std::process::id().to_string());
+        copy_all(directory, &copy);
+        let _ = std::fs::rename(&copy, &made);
+    } else {
+        copy_all(&made.join("."), directory);
+    }
+}
+
+fn copy_all(from: &Path, to: &Path) {
+    let copied = Command::new("cp").arg("-a").arg(from).arg(to).output().unwrap();
+    assert!(copied.status.success(), "{}", String::from_utf8_lossy(&copied.stderr));
+}
+
+fn initialise(directory: &Path) {
+    let made = as_nobody(programs().join("initdb"))
+        .args(["--username=offbd", "--auth=trust", "--encoding=UTF8", "--locale=C"])
+        .args(["--locale-provider=icu", "--icu-locale=en-US", "--no-sync", "-D"])
+        .arg(directory)
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
 }
 
 fn programs() -> &'static PathBuf {

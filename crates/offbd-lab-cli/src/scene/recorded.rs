@@ -13,7 +13,7 @@ use offbd_core::engine::{FreeRunPoint, free_run};
 use offbd_core::plant::SimulatedTwin;
 use offbd_core::vocabulary::{Axis, in_range};
 use offbd_file_cli::recordings::Recording;
-use offbd_file_cli::{calibrate, judge};
+use offbd_file_cli::{calibrate, judge, recordings};
 use offbd_lab::chart::Figure;
 use offbd_terminal::errors::{BadArgument, InputError};
 use offbd_terminal::output::{self, OutputFormat};
@@ -75,7 +75,7 @@ impl RecordedRun {
         let on_plate =
             |p: &&FreeRunPoint| plate.edge_distance_m(p.ball.position.x, p.ball.position.y) >= 0.0;
         let leaves_s = points.iter().find(|p| !on_plate(p)).map(|p| p.at.seconds());
-        let session = judge::session_name(path);
+        let session = recordings::session_name(path);
         Ok(Self { session, rig: setup.rig.name, step_s, points, end, apart, leaves_s })
     }
 

@@ -8,9 +8,10 @@ use std::thread::JoinHandle;
 use tokio::sync::mpsc;
 
 use super::actor::Asset;
-use super::command::{AssetCommand, AssetLook, Reply};
+use super::command::{AssetCommand, AssetLook};
 use super::loader::LoadQueue;
 use super::message::{LoadResult, ShardMessage};
+use super::reply::Reply;
 use super::turn::{Environment, Turn};
 use crate::ServiceError;
 use crate::writing::{EngineGeneration, WriteSet};

@@ -6,9 +6,10 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot};
 
 use super::actor::Asset;
-use super::command::{AssetCommand, Reply};
+use super::command::AssetCommand;
 use super::loader::Loader;
 use super::message::ShardMessage;
+use super::reply::Reply;
 use super::shard::Shard;
 use super::turn::Environment;
 use crate::{Limits, ServiceError};

@@ -2,8 +2,8 @@
 
 use tokio::sync::mpsc::OwnedPermit;
 
-use super::command::Reply;
 use super::presence::Presences;
+use super::reply::Reply;
 use crate::ServiceError;
 use crate::job::{JobQueue, JobRoom, NewJob};
 use crate::writing::{EngineGeneration, Handles, WriteSet};

@@ -7,7 +7,7 @@ mod listen;
 mod plan;
 mod routes;
 
-use std::sync::{Arc, Weak};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::{Notify, mpsc};
@@ -21,8 +21,7 @@ pub use self::routes::Route;
 pub(super) use self::routes::Routes;
 use super::asset::Shards;
 use super::ownership::Ownership;
-use super::start::Inner;
-use super::writing::{Handles, TransferRequest, Transfers};
+use super::writing::{Events, Handles, TransferRequest, Transfers};
 use super::{Reasons, Service, ServiceError};
 use offbd_store::{Micros, NodeIdentity, NodeRow, PartitionId, PartitionRow};
 use offbd_wire::cluster::{ClusterView, NodeView, PlaceView};
@@ -41,10 +40,6 @@ const LEAVE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Difference of the clocks of a node and of the database that is logged, µs. Chosen: what the
 /// manual asks for.
 const WRONG_CLOCK: Micros = 1_000_000;
-
-/// Take-overs whose work waits to be continued. If there are more, the jobs of a partition
-/// stay queued until its next owner.
-const MAX_RESUMED: usize = 1024;
 
 /// What a process knows of its cluster.
 #[derive(Clone)]
@@ -98,35 +93,21 @@ const fn clock_offset(read_at: Micros, before: Micros, after: Micros) -> Micros 
     }
 }
 
-/// Starts the tasks of a node on the current runtime.
-pub(crate) fn spawn(task: NodeTask, service: &Service) -> Vec<JoinHandle<()>> {
-    let Inner { handles, events, .. } = &*service.inner;
-    let (resume, taken) = mpsc::channel(MAX_RESUMED);
+/// Starts the tasks of a node on the current runtime. The partitions that are taken are sent to
+/// `taken`.
+pub(crate) fn spawn(
+    task: NodeTask,
+    events: &Events,
+    taken: mpsc::Sender<Vec<PartitionId>>,
+) -> Vec<JoinHandle<()>> {
+    let handles = &task.handles;
     let closing = handles.closing.clone();
     vec![
         tokio::spawn(listen::run(handles.clone(), task.cluster.clone(), events.clone())),
         tokio::spawn(events.clone().read_all(closing.clone())),
-        tokio::spawn(events.clone().announce_all(closing.clone())),
-        tokio::spawn(resume_taken(Arc::downgrade(&service.inner), taken, closing)),
-        tokio::spawn(task.run(resume)),
+        tokio::spawn(events.clone().announce_all(closing)),
+        tokio::spawn(task.run(taken)),
     ]
-}
-
-/// Continues the work of the former owners of partitions that were taken: interrupted
-/// imports are discarded, jobs queued again, and engines that are far behind rebuilt.
-async fn resume_taken(
-    service: Weak<Inner>,
-    mut taken: mpsc::Receiver<Vec<PartitionId>>,
-    closing: CancellationToken,
-) {
-    while let Some(Some(partitions)) = closing.run_until_cancelled(taken.recv()).await {
-        let Some(inner) = service.upgrade() else { return };
-        let service = Service { inner };
-        let resume = service.resume(Some(&partitions));
-        if let Some(Err(error)) = closing.run_until_cancelled(resume).await {
-            tracing::error!(%error, "cannot continue the work of partitions that were taken");
-        }
-    }
 }
 
 impl NodeTask {

@@ -284,11 +284,11 @@ async fn a_kind_that_follows_soon_is_in_the_first_message_and_a_late_one_updates
 
     let fixture = NotifierFixture::new(json!({})).await;
     fixture.confirm(0, None).await;
-    let sent = fixture.pass(5 * SECOND, SECOND).await;
-    assert_eq!(sent, attempts(&[(2, "confirmed.v1", "evt_1")]));
+    let sent = fixture.pass(8 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(5, "confirmed.v1", "evt_1")]));
     fixture.confirm(1, Some("dead")).await;
-    let sent = fixture.pass(6 * SECOND, SECOND).await;
-    assert_eq!(sent, attempts(&[(5, "updated.v1", "evt_2")]));
+    let sent = fixture.pass(9 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(8, "updated.v1", "evt_2")]));
     let updates = || {
         let last = fixture.inbox.attempts.lock().unwrap().pop().unwrap();
         last.1.data.updates
@@ -297,7 +297,7 @@ async fn a_kind_that_follows_soon_is_in_the_first_message_and_a_late_one_updates
     // Two more, of which the last one has the message.
     fixture.confirm(2, Some("dead")).await;
     fixture.confirm(3, Some("held")).await;
-    let sent = fixture.pass(8 * SECOND, SECOND).await;
-    assert_eq!(sent, attempts(&[(6, "updated.v1", "evt_4")]));
+    let sent = fixture.pass(11 * SECOND, SECOND).await;
+    assert_eq!(sent, attempts(&[(9, "updated.v1", "evt_4")]));
     assert_eq!(updates().as_deref(), Some("evt_2"));
 }

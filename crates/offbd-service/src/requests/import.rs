@@ -9,12 +9,13 @@ use crate::PendingBatch;
 use crate::asset::AssetCommand;
 use crate::{Service, ServiceError};
 use offbd_core::vocabulary::Sample;
+use offbd_wire::inspection::{self, InspectionView};
 use offbd_wire::judging::run_name;
 use offbd_wire::service::{ImportView, SessionView};
 use offbd_wire::session_file::{
     self, JoinedRows, SessionFileError, SessionFormat, SessionRowError, SessionRows,
 };
-use offbd_wire::table::{self, InspectionView, TableOptions};
+use offbd_wire::table::TableOptions;
 use offbd_wire::telemetry::{AckView, Batch, BatchError, RowView, file_row};
 
 /// Batches of an import that wait for their acknowledgement at a time.
@@ -25,6 +26,10 @@ const MAX_LISTED: usize = 100;
 
 /// Samples in one batch of an import.
 const BATCH: usize = 2048;
+
+/// Rejected rows that are kept until the first valid one is found. Chosen: more would take memory, and
+/// a file that begins with so many is seldom a recording.
+const MAX_EARLY: usize = 10_000;
 
 const STOPPED: ServiceError = ServiceError::Unavailable { what: "the service is shutting down" };
 
@@ -42,8 +47,8 @@ impl Service {
     /// # Errors
     /// [`ServiceError::SessionExists`]; [`ServiceError::Invalid`] for an invalid name;
     /// [`ServiceError::TooMany`] if there are more rows; [`ServiceError::Batch`] if the file
-    /// cannot be read to its end; [`ServiceError::Unavailable`] if the service stops; those of
-    /// the samples' batches.
+    /// cannot be read to its end, or has no valid row; [`ServiceError::Unavailable`] if the
+    /// service stops; those of the samples' batches.
     pub async fn import<S: Read + Seek + Send + 'static>(
         &self,
         asset: &str,
@@ -81,7 +86,7 @@ impl Service {
         let permit = stop.run_until_cancelled(permit).await.and_then(Result::ok).ok_or(STOPPED)?;
         let source = StoppableSource { source, stop };
         let task = tokio::task::spawn_blocking(move || {
-            let inspected = table::inspect(source, &options);
+            let inspected = inspection::inspect(source, &options);
             drop(permit);
             inspected.map_err(|error| unreadable(&error))
         });
@@ -142,7 +147,7 @@ impl Import {
             }
         };
         let runtime = self.service.inner.handles.runtime.clone();
-        runtime.block_on(self.import(name, RunRows { rows, next: None }))
+        runtime.block_on(self.import(name, RunRows::new(rows)))
     }
 
     /// Imports each run as a session.
@@ -152,6 +157,11 @@ impl Import {
         mut rows: RunRows,
     ) -> Result<ImportView, ServiceError> {
         let Self { service, asset, stop, .. } = self;
+        // A file without a sample does not end the open session.
+        rows.find_sample().map_err(|error| match error {
+            NoSample::Unreadable(error) => self.unreadable(&error),
+            NoSample::Rejected(reason) => no_usable_row(reason.as_deref()),
+        })?;
         let first = service.open_for(asset, name, true).await?;
         let name = first.name.clone();
         let mut sessions = vec![first];
@@ -170,7 +180,9 @@ impl Import {
             }
         };
         let imported = match stop.run_until_cancelled(imported).await {
-            // The rows of a CSV file also end where it cannot be read any further.
+            Some(Ok(())) if !stop.is_cancelled() && counts.accepted == 0 => {
+                Err(no_usable_row(counts.rejections.first().map(|row| row.reason.as_str())))
+            }
             Some(imported) if !stop.is_cancelled() => imported,
             _ => Err(STOPPED),
         };
@@ -238,6 +250,12 @@ impl Import {
     }
 }
 
+/// The error of a file of which no row is a sample, with the reason of the first.
+fn no_usable_row(reason: Option<&str>) -> ServiceError {
+    let why = reason.map_or_else(String::new, |reason| format!(": {reason}"));
+    BatchError::Malformed { pointer: String::new(), reason: format!("no usable row{why}") }.into()
+}
+
 fn unreadable(error: &SessionFileError) -> ServiceError {
     BatchError::Malformed { pointer: String::new(), reason: error.to_string() }.into()
 }
@@ -267,11 +285,46 @@ impl<S: Seek> Seek for StoppableSource<S> {
 /// The rows of a file, one run after the other.
 struct RunRows {
     rows: Box<dyn SessionRows>,
+    /// The rows up to the first valid one.
+    early: VecDeque<Result<Sample, SessionRowError>>,
     /// The first row of the next run.
     next: Option<Result<Sample, SessionRowError>>,
 }
 
+/// Why a file has no sample.
+enum NoSample {
+    /// The reason of its first rejected row, if it has one.
+    Rejected(Option<String>),
+    Unreadable(SessionFileError),
+}
+
 impl RunRows {
+    fn new(rows: Box<dyn SessionRows>) -> Self {
+        Self { rows, early: VecDeque::new(), next: None }
+    }
+
+    /// Reads up to the first valid row. After [`MAX_EARLY`] rows there may be one.
+    fn find_sample(&mut self) -> Result<(), NoSample> {
+        while self.early.len() < MAX_EARLY {
+            match self.rows.next() {
+                Some(Err(SessionRowError::Unreadable(error))) => {
+                    return Err(NoSample::Unreadable(error));
+                }
+                Some(Err(row)) => self.early.push_back(Err(row)),
+                Some(Ok(sample)) => {
+                    self.early.push_back(Ok(sample));
+                    return Ok(());
+                }
+                None => {
+                    let first = self.early.pop_front();
+                    let reason = first.and_then(Result::err).map(|error| error.to_string());
+                    return Err(NoSample::Rejected(reason));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The number of the run that the rows have come to, from 1.
     fn run(&self) -> usize {
         self.rows.n_runs()
@@ -280,7 +333,7 @@ impl RunRows {
     /// Returns the next row if it belongs to the run `n_run`.
     fn next_of(&mut self, n_run: usize) -> Option<Result<Sample, SessionRowError>> {
         if self.next.is_none() {
-            self.next = self.rows.next();
+            self.next = self.early.pop_front().or_else(|| self.rows.next());
         }
         self.next.take_if(|_| self.rows.n_runs() == n_run)
     }

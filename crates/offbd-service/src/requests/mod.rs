@@ -31,6 +31,7 @@ mod trends;
 mod trials;
 
 pub use alarms::AlarmQuery;
+pub(crate) use drive_cycles::LastSearch;
 pub use events::PresentFault;
 pub use faults::FaultQuery;
 pub use fleet::FleetQuery;

@@ -1,7 +1,7 @@
 //! The writer thread: commits all queued write sets as one group, then completes them.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -13,6 +13,7 @@ use tracing::Instrument;
 use super::events::{Event, Events};
 use super::pace::Pace;
 use super::transfer::TransferRequest;
+use super::write_set::WriteSet;
 use crate::ownership::Ownership;
 use crate::{Reasons, ServiceError};
 use offbd_store::{ChangeSet, PartitionId, StoreError, TransitionRow, Write, Writer};
@@ -46,43 +47,6 @@ const CLOSING_WAIT: Duration = Duration::from_secs(5);
 
 /// Why the database is unavailable; `None` if it is available.
 pub(crate) type Outage = Option<String>;
-
-/// One instance of an asset's engine, from loading to dropping it. Once invalidated, the
-/// engine is ahead of the store and none of its write sets is committed any more.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct EngineGeneration {
-    invalid: Arc<AtomicBool>,
-}
-
-impl EngineGeneration {
-    pub(crate) fn invalidate(&self) {
-        self.invalid.store(true, Ordering::SeqCst);
-    }
-
-    pub(crate) fn is_invalid(&self) -> bool {
-        self.invalid.load(Ordering::SeqCst)
-    }
-
-    /// Whether some of its write sets may not be committed or refused yet; each holds a clone.
-    pub(crate) fn has_unsettled(&mut self) -> bool {
-        Arc::get_mut(&mut self.invalid).is_none()
-    }
-}
-
-/// Called once the write set is durable, or with the reason why it is not.
-pub(crate) type Completion = Box<dyn FnOnce(Result<(), ServiceError>) + Send>;
-
-/// Changes that are committed together.
-pub(crate) struct WriteSet {
-    /// The partition of the asset; `None` for changes that concern none.
-    pub(crate) partition: Option<PartitionId>,
-    pub(crate) writes: Vec<Write>,
-    /// Whether nobody is held up if it is committed some milliseconds later: it is of a device
-    /// that sends at its own pace, not as fast as it is acknowledged.
-    pub(crate) can_wait: bool,
-    pub(crate) generation: EngineGeneration,
-    pub(crate) completion: Completion,
-}
 
 /// The writer thread's state.
 pub(crate) struct Committer {

@@ -12,8 +12,9 @@ use tokio::sync::mpsc::error::{SendTimeoutError, TrySendError};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
-use super::commit::{EngineGeneration, Outage, WriteSet};
+use super::commit::Outage;
 use super::events::READ_TIMEOUT;
+use super::write_set::{EngineGeneration, WriteSet};
 use crate::limits::SessionLimits;
 use crate::ownership::Ownership;
 use crate::{Clock, Limits, ServiceError};

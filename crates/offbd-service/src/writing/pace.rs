@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
-use super::commit::WriteSet;
+use super::write_set::WriteSet;
 
 /// How long a group waits for write sets of other devices. Chosen: at a thousand requests a second it
 /// gathers five of them, which then cost one write of the log and one sync.
