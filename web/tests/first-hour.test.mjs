@@ -59,8 +59,12 @@ async function firstHour(asset, file, map) {
   await imported(view, dialogue, "monday");
   const { x } = await calibrated(view, asset);
   assert.ok(Math.abs(x.gain - rig.learnt.calibration.x.gain) < 0.05, `the gain is ${x.gain}`);
-  // The mapping is known now.
+  // The mapping is known now; while the file is read by it, nothing can be imported.
+  const read = view.waitForResponse(
+    (answer) => /dry_run/.test(answer.url()) && answer.url().includes(`/${asset}/`),
+  );
   dialogue = await opened(view, "tuesday.csv", file(rig.sick), asset);
+  await read;
   await imported(view, dialogue, "tuesday");
   await view
     .getByText(/X servo.* confirmed/)

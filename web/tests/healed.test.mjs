@@ -32,7 +32,7 @@ test("the list of alarms tells of it, and its page takes the acknowledgement", a
   const { acknowledged, status } = await ask(service.url, "GET", "/assets/bench/faults/x_servo");
   assert.deepEqual([acknowledged, status], [true, "healed"]);
   await view.goto(`${service.url}/alarms`);
-  await view.getByRole("heading", { name: "Alarms" }).waitFor();
+  await view.getByRole("heading", { name: "Alarms", exact: true }).waitFor();
   await view.getByText("No alarms").waitFor();
   assert.equal(await view.getByText("healed before anybody").count(), 0);
   assert.deepEqual(view.errors, []);

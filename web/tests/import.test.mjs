@@ -116,3 +116,19 @@ test("a recording as its owner has it is read by its guesses, once they are conf
   assert.deepEqual(view.errors, []);
   await view.done();
 });
+
+test("a recording of a known rig is imported while the list of rigs is still being read", async () => {
+  const view = await page(chromium);
+  let n = 0;
+  // The first list does not arrive.
+  await view.route("**/api/v1/fleet*", (route) => (n++ ? route.continue() : undefined));
+  await view.goto(`${service.url}/sessions`);
+  const buffer = Buffer.from(rig.healthy);
+  await view.locator("input[type=file]").setInputFiles({ name: "early.csv", mimeType: "text/csv", buffer });
+  const dialogue = view.getByRole("dialog");
+  await dialogue.getByLabel("Rig").fill("bench");
+  await dialogue.getByRole("button", { name: /^Import/ }).click();
+  await view.getByRole("heading", { name: "early", exact: true }).waitFor();
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});

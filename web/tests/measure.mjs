@@ -77,7 +77,7 @@ try {
   await opened(of, `${show.url}/rigs/demo-rig`, "rig", (view) =>
     view.getByRole("button", { name: "30 s" }).click(),
   );
-  const view = await page(of);
+  const view = await page(of, { reducedMotion: "no-preference" });
   await view.addInitScript(watch);
   await view.goto(`${show.url}/rigs/demo-rig`);
   await view.locator(".stage canvas").waitFor();
@@ -101,7 +101,7 @@ try {
     );
   }
   await opened(of, service.url, `fleet of ${RIGS}`, (view) => view.getByRole("searchbox").fill("rig-49"));
-  const view = await page(of);
+  const view = await page(of, { reducedMotion: "no-preference" });
   await view.addInitScript(watch);
   await view.goto(service.url);
   await view.getByRole("link", { name: /rig-1\b/ }).waitFor();

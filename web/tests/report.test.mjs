@@ -47,6 +47,9 @@ for (const [what, address, link] of [
     assert.ok(n >= 1 && n <= 2, `${n} pages`);
     await view.emulateMedia({ media: "print" });
     assert.equal(await view.getByRole("button", { name: "Print" }).isVisible(), false);
+    // The colours of the legend are printed too.
+    const adjusted = view.locator(".report .u-wrap").first();
+    assert.equal(await adjusted.evaluate((e) => getComputedStyle(e).printColorAdjust), "exact");
     assert.deepEqual(view.errors, []);
     await view.done();
   });

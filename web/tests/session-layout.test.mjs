@@ -22,6 +22,20 @@ test("the ball, the controls of the playback and the residual are seen together"
   }
 });
 
+test("on a phone the controls of the playback are directly below the ball", async () => {
+  const session = await imported(service.url, "bench", "phone", rig.sick);
+  const view = await page(chromium, { viewport: { width: 390, height: 844 } });
+  await view.goto(`${service.url}/sessions/${session.id}`);
+  const [ball, verdict] = [view.locator("canvas").first(), view.locator(".verdict").first()];
+  const slider = view.getByRole("slider", { name: "Moment" });
+  for (const part of [ball, verdict, slider]) await part.waitFor();
+  const [top, found, controls] = [ball, verdict, slider].map((part) => part.boundingBox());
+  const [{ y }, verdictBox, sliderBox] = await Promise.all([top, found, controls]);
+  assert.ok(verdictBox.y < y, `the verdict is at ${verdictBox.y}, the ball at ${y}`);
+  assert.ok(sliderBox.y > y && sliderBox.y + sliderBox.height - y < 600, `${y} and ${sliderBox.y}`);
+  await view.done();
+});
+
 async function areSeenTogether(session, viewport) {
   const view = await page(chromium, { viewport });
   await view.goto(`${service.url}/sessions/${session.id}`);

@@ -119,6 +119,8 @@ export async function browser(options = {}) {
     executablePath,
     args: [
       "--no-sandbox",
+      // Without a graphics card a page is painted with less effort than through a driver for one.
+      "--disable-gpu-compositing",
       "--use-angle=swiftshader",
       "--enable-unsafe-swiftshader",
       "--ignore-gpu-blocklist",

@@ -3,7 +3,8 @@ import { useQuery } from "./use-query";
 
 const NONE: string[] = [];
 
-const fetchNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));
+/** Reads the names of all rigs. */
+export const fetchRigNames = () => api.fleet().then((fleet) => fleet.map((entry) => entry.asset));
 
 /** The names of all rigs; none until they are known. */
-export const useRigNames = (): string[] => useQuery(fetchNames, "names").data ?? NONE;
+export const useRigNames = (): string[] => useQuery(fetchRigNames, "names").data ?? NONE;

@@ -22,3 +22,12 @@ test("alarms are grouped by the tags of their rigs, under each of them", () => {
   );
   assert.equal(grouped(alarms, "").length, 1);
 });
+
+test("a group tells the number of all its alarms, of which some are shown", () => {
+  const all = Array.from({ length: 130 }, (_, i) => alarm(`rig-${i}`, i < 120 ? "x_servo" : "sensor"));
+  const groups = grouped(all, "fault", new Map(), 100);
+  assert.deepEqual(
+    groups.map(({ alarms, total }) => [alarms.length, total]),
+    [[100, 120]],
+  );
+});

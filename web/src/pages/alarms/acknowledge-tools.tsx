@@ -1,3 +1,4 @@
+import { useState } from "preact/hooks";
 import { useDelayed } from "../../hooks/use-delayed";
 import { ActorField, useActor } from "../../parts/actor-field";
 import { useRefusal } from "../../parts/login/rights";
@@ -14,6 +15,8 @@ interface Props {
 export function AcknowledgeTools({ open, acknowledge }: Props) {
   const actor = useActor();
   const refused = useRefusal("operator");
+  /** How many were chosen when the button was used: others may be chosen while it can be taken back. */
+  const [asked, setAsked] = useState(0);
   const delayed = useDelayed(() => {
     actor.remember();
     return acknowledge();
@@ -26,11 +29,14 @@ export function AcknowledgeTools({ open, acknowledge }: Props) {
         class="primary"
         disabled={!open || delayed.isWaiting || refused !== undefined}
         title={refused}
-        onClick={delayed.start}
+        onClick={() => {
+          setAsked(open);
+          delayed.start();
+        }}
       >
         Acknowledge {open || ""}
       </button>
-      <UndoNote delayed={delayed} text={`Acknowledging ${plural(open, "alarm")}.`} />
+      <UndoNote delayed={delayed} text={`Acknowledging ${plural(asked, "alarm")}.`} />
     </>
   );
 }

@@ -31,7 +31,7 @@ export function AlarmList({ alarms, group, chosen, choose }: Props) {
       </p>
       <AlarmTable
         alarms={alarms}
-        groups={grouped(alarms.slice(0, n), group, tags)}
+        groups={grouped(alarms, group, tags, n)}
         now={now}
         advice={advice.data}
         refetchAdvice={advice.refetch}

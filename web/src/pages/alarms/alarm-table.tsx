@@ -33,12 +33,12 @@ export function AlarmTable({ alarms, groups, now, advice, refetchAdvice, chosen,
           choose={() => choose(new Set(areAllChosen ? [] : open))}
         />
         <tbody>
-          {groups.map(({ heading, alarms }) => (
+          {groups.map(({ heading, alarms, total }) => (
             <>
               {heading && (
                 <tr class="group">
                   <th colSpan={6} scope="rowgroup">
-                    {heading} <span class="quiet">({alarms.length})</span>
+                    {heading} <span class="quiet">({total})</span>
                   </th>
                 </tr>
               )}

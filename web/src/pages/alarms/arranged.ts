@@ -45,7 +45,9 @@ const HEADINGS: Record<string, (alarm: Alarm, tags: RigTags) => string[]> = {
 export interface AlarmGroup {
   /** Empty if the alarms are not grouped. */
   heading: string;
+  /** Those that are shown, and the number of all. */
   alarms: Alarm[];
+  total: number;
 }
 
 /** Returns the alarms of the rigs whose names contain `rig`, in an order of `ORDERS`. */
@@ -56,11 +58,29 @@ export function chosenAlarms(alarms: Alarm[], rig: string, order: string): Alarm
   return compare ? found.sort(compare) : found;
 }
 
-/** Returns the alarms by a grouping of `GROUPS`: the groups in the order of their first alarms. */
-export function grouped(alarms: Alarm[], by: string, tags: RigTags = new Map()): AlarmGroup[] {
+/**
+ * Returns the alarms by a grouping of `GROUPS`: the groups in the order of their first alarms, and of all of them
+ * together the first `shown`.
+ */
+export function grouped(
+  alarms: Alarm[],
+  by: string,
+  tags: RigTags = new Map(),
+  shown = Infinity,
+): AlarmGroup[] {
   const headings = HEADINGS[by] ?? (() => [""]);
   const groups = new Map<string, Alarm[]>();
   for (const alarm of alarms)
-    for (const title of headings(alarm, tags)) groups.set(title, [...(groups.get(title) ?? []), alarm]);
-  return [...groups].map(([heading, alarms]) => ({ heading, alarms }));
+    for (const title of headings(alarm, tags)) {
+      const group = groups.get(title);
+      if (group) group.push(alarm);
+      else groups.set(title, [alarm]);
+    }
+  let room = shown;
+  const cut = [...groups].map(([heading, all]) => {
+    const group = { heading, alarms: all.slice(0, room), total: all.length };
+    room -= group.alarms.length;
+    return group;
+  });
+  return cut.filter((group) => group.alarms.length > 0);
 }

@@ -99,7 +99,7 @@ export function FleetRow({ row: { entry, health }, seenAt }: { row: Row; seenAt:
     <Link to={rigPath(entry.asset)} class={`fleet-row row-${health}`}>
       <span class="name">
         {entry.asset}
-        {!entry.calibrated && (
+        {!entry.calibrated && !(health === "unlearnt" && entry.learning === "gathering") && (
           <span class="quiet small-text" title={meaning}>
             {" "}
             {word}

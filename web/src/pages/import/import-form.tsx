@@ -35,7 +35,7 @@ export function ImportForm({ file, inspection, inspecting, rigRate, ...props }: 
       {isText && <MappingTable inspection={inspection} change={change} />}
       {isText && !hasTime && <RateField rate={rate} setRate={setRate} />}
       {isText && inspection.mapping !== "" && (
-        <label>
+        <label class="check">
           <input type="checkbox" checked={isKept} onChange={(e) => setKept(e.currentTarget.checked)} /> Save
           this mapping for further files
         </label>

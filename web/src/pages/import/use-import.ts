@@ -1,6 +1,7 @@
-import { useRef, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { api } from "../../api/client";
 import type { FileReading, ImportResult } from "../../api/types";
+import { fetchRigNames } from "../../hooks/use-rig-names";
 import { navigate } from "../../router/navigation";
 import { sessionPath } from "../../router/paths";
 
@@ -20,14 +21,12 @@ const withoutExtension = (name: string) => name.replace(/\.\w+$/, "");
 /** Where a recording is imported to, and its import, which registers the rig if it is new. */
 export function useImport({ fileName, assets, asset, setAsset, imported }: ImportProps) {
   const [session, setSession] = useState(withoutExtension(fileName));
-  /** Rigs that were registered for an import that has failed. */
-  const registered = useRef<string[]>([]);
   /** Imports the file; `isKept` tells whether further files of the rig are read in the same way. */
   const send = async (file: File, reading: FileReading, isKept: boolean) => {
     const columns = isKept ? reading.columns : undefined;
-    if (![...assets, ...registered.current].includes(asset)) {
+    // The page's list of rigs may not be read yet.
+    if (!(await fetchRigNames()).includes(asset)) {
       await api.createAsset({ name: asset, columns });
-      registered.current.push(asset);
     } else if (columns) {
       const before = await api.asset(asset);
       await api.putAsset({ ...before, columns }, before);

@@ -27,8 +27,8 @@ export function DiagnosisFields(fields: FieldsProps) {
         max={MOST_ALARMS}
       >
         For a healthy rig that always runs; at most a million. Fewer false alarms need more evidence: faults
-        are found later, and small ones not at all. Empty: about 26 a year. This is for the servos alone; ball
-        and sensor have their own tests, and what is expected of each is shown after the calibration.
+        are found later, and small ones not at all. Empty: about 26 a year. This is for the servos alone: for
+        ball and sensor, choose the debounce time. What is expected of each is shown after the calibration.
       </OptionalNumber>
       <p class="quiet small-text">Applies from the next session.</p>
     </details>

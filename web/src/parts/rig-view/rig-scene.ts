@@ -26,6 +26,7 @@ export class RigScene {
   private plateFrame = new Group();
   private ball = new Group();
   private ghost = new Group();
+  private shown: Pose | null = null;
   /** Whether anything has changed since the last rendering. */
   private isDirty = true;
   private readonly cleanups: (() => void)[] = [];
@@ -74,6 +75,8 @@ export class RigScene {
   }
 
   show(pose: Pose): void {
+    if (isSame(pose, this.shown)) return;
+    this.shown = pose;
     this.plate.rotation.set(pose.qx, pose.qy, 0, "XYZ");
     move(this.ball, pose.ball);
     move(this.ghost, pose.ghost);
@@ -116,9 +119,17 @@ export class RigScene {
     const world = buildFrame(this.size * 0.22, "₀", 0.45);
     world.position.set(-this.size * 0.62, -this.size * 0.45, -this.size * 0.22);
     this.worldFrame.add(world);
+    const { shown } = this;
+    this.shown = null;
+    if (shown) this.show(shown);
     this.resize();
   }
 }
+
+const isSamePoint = (a: PlanePoint | null, b: PlanePoint | null) => a?.x === b?.x && a?.y === b?.y;
+
+const isSame = (a: Pose, b: Pose | null) =>
+  a.qx === b?.qx && a.qy === b.qy && isSamePoint(a.ball, b.ball) && isSamePoint(a.ghost, b.ghost);
 
 function move(ball: Group, to: PlanePoint | null): void {
   ball.visible = to !== null;
