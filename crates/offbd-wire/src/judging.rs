@@ -155,7 +155,11 @@ impl Judging {
     /// Contradictions between the data and the rig's description.
     #[must_use]
     pub fn misfits(&self) -> Vec<Misfit> {
-        self.plausibility.misfits()
+        let offsets = self.engine.session_offsets();
+        let levels = self.plausibility.levels(&offsets);
+        // A confirmed or suspected servo needs no doubt.
+        let is_open = |m: &Misfit| m.doubted_servo().is_none_or(|code| !self.verdict.accuses(code));
+        self.plausibility.misfits().into_iter().chain(levels.filter(is_open)).collect()
     }
 
     /// The summary of the session, with the name `session` and `n_rejected` rejected rows.

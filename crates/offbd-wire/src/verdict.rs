@@ -421,6 +421,12 @@ impl Verdict {
         &self.confirmed
     }
 
+    /// Whether `code` was confirmed or suspected in this session.
+    #[must_use]
+    pub fn accuses(&self, code: FaultCode) -> bool {
+        self.confirmed.contains(&code) || self.suspected[code as usize].is_some()
+    }
+
     /// Returns the hash of the verdict so far: SHA-256, lower-case hexadecimal.
     #[must_use]
     pub fn hash(&self) -> String {

@@ -154,7 +154,7 @@ words! {
         NoReadings = "no_readings", NoCommands = "no_commands", NoAxis = "no_axis",
         Short = "short", Rate = "rate", Positions = "positions", Commands = "commands",
         CommandsHeld = "commands_held", OneAxis = "one_axis", Swapped = "swapped",
-        WrongSign = "wrong_sign", Scale = "scale", NoRoom = "no_room",
+        WrongSign = "wrong_sign", Scale = "scale", NoRoom = "no_room", Level = "level",
     }
 }
 
@@ -174,6 +174,7 @@ impl From<&Misfit> for MisfitWord {
             Misfit::WrongSign { .. } => Self::WrongSign,
             Misfit::Scale { .. } => Self::Scale,
             Misfit::NoRoom { .. } => Self::NoRoom,
+            Misfit::Level { .. } => Self::Level,
         }
     }
 }

@@ -68,8 +68,9 @@ function listed(monitors: JudgedMonitor[], outcome: Outcome, words: string): str
 }
 
 /** Whether a wrong unit explains the faults as well, as a warning of the summary says. */
-const isExcused = ({ outcome, monitors }: Summary) =>
-  outcome === "cannot tell" && !monitors?.some((each) => each.outcome === outcome);
+const isExcused = ({ outcome, monitors, faults }: Summary) =>
+  outcome === "cannot tell" &&
+  !monitors?.some((each) => faults.includes(each.code) && each.outcome === outcome);
 
 /**
  * Returns the result of a session, with the monitors that did not judge it, and its style. The kinds of its faults are
@@ -81,17 +82,20 @@ export function verdict(summary: Summary, lines: Finding[] = [], profile?: strin
   const tested = all.filter(({ code }) => hasTest(code, profile));
   const others = all.filter(({ code }) => !hasTest(code, profile));
   const faults = summary.faults.map((code) => faultText(summary, code, lines)).join(", ");
-  const found = isExcused(summary) ? `Cannot tell a wrong unit from ${faults}` : faults;
+  const found = faults && isExcused(summary) ? `Cannot tell a wrong unit from ${faults}` : faults;
   const suspected = listed(all, "pending", "Suspected only");
   const passed = listed(all, "no fault", "No fault");
+  const unfound = all.filter(({ code }) => !summary.faults.includes(code));
+  const doubted = listed(unfound, "cannot tell", "cannot tell");
   const rest = [
+    doubted,
     listed(all, "not learnt", "not calibrated"),
     listed(tested, "not judged", "not judged"),
     listed(others, "not judged", "no test in this profile"),
   ].filter(Boolean);
   const text = (first: string) => capitalised([first, ...rest].filter(Boolean).join("; "));
   if (found) return { text: text(found), look: "status-confirmed" };
-  if (suspected) return { text: text(suspected), look: "status-pending" };
+  if (suspected || doubted) return { text: text(suspected || passed), look: "status-pending" };
   if (rest.length) return { text: text(passed), look: "quiet" };
   return { text: "No fault", look: "status-ok" };
 }

@@ -34,3 +34,15 @@ test("a verdict tells the kind that was confirmed first, and those named later",
     "X servo (probably offset, 51 %), Position sensor",
   );
 });
+
+test("a verdict names the servo whose axis has another level, and does not take it for a wrong unit", () => {
+  const monitor = (code, outcome) => ({ code, outcome, candidates: [] });
+  const monitors = [monitor("x_servo", "no fault"), monitor("y_servo", "cannot tell")];
+  const of = { outcome: "cannot tell", faults: [], monitors };
+  assert.deepEqual(verdict(of), {
+    text: "No fault: X servo; cannot tell: Y servo",
+    look: "status-pending",
+  });
+  const excused = { ...of, faults: ["x_servo"], monitors: [monitor("x_servo", "fault"), monitors[1]] };
+  assert.equal(verdict(excused).text, "Cannot tell a wrong unit from X servo; cannot tell: Y servo");
+});

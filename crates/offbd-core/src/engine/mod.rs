@@ -353,6 +353,13 @@ impl Engine {
         self.pipeline.servo_estimates()
     }
 
+    /// Returns the offset of each servo in this session, as an acceleration of the ball, and its standard
+    /// error, m/s²: averaged over the last 20 s, of a servo that is taken for healthy.
+    #[must_use]
+    pub fn session_offsets(&self) -> PerAxis<(f64, f64)> {
+        self.pipeline.session_offsets()
+    }
+
     /// Notes that a sample was rejected by the caller, who has looked it up, or could not read
     /// it.
     pub fn note_rejected(&mut self, why: Rejection) {

@@ -595,6 +595,11 @@ impl Pipeline {
         PerAxis::from_fn(|axis| self.servos[axis].estimate())
     }
 
+    /// Returns the offset of each servo in this session, and its standard error, m/s².
+    pub(super) fn session_offsets(&self) -> PerAxis<(f64, f64)> {
+        PerAxis::from_fn(|axis| self.servos[axis].session_offset())
+    }
+
     /// Largest evidence against each servo so far, nats, scaled to the evidence that
     /// confirms without a calibration.
     pub(super) fn most_nats(&self) -> PerAxis<f64> {

@@ -28,6 +28,7 @@ pub(super) fn coloured(session: &JudgedSession, profile: Profile) -> String {
 /// The look of a verdict; `None` if a part of it is not known.
 fn look(summary: &SummaryView) -> Option<Look> {
     match summary.outcome? {
+        Outcome::CannotTell if summary.faults.is_empty() => Some(Look::Doubtful),
         Outcome::Fault | Outcome::CannotTell => Some(Look::Bad),
         Outcome::Pending => Some(Look::Doubtful),
         Outcome::NoFault => Some(Look::Good),
@@ -51,7 +52,9 @@ fn summary_words(summary: &SummaryView, found: &[String], profile: Profile) -> S
     let of = |outcome| codes(summary, outcome, |_| true);
     let (judged, pending) = (of(Outcome::NoFault), of(Outcome::Pending));
     let has_test = |code: CodeWord| profile.has_test(code.into());
+    let is_unfound = |code: CodeWord| !summary.faults.contains(&code);
     let rest = [
+        (Outcome::CannotTell.words(), codes(summary, Outcome::CannotTell, is_unfound)),
         (Outcome::NotLearnt.words(), of(Outcome::NotLearnt)),
         (Outcome::NotJudged.words(), codes(summary, Outcome::NotJudged, has_test)),
         ("no test in this profile", codes(summary, Outcome::NotJudged, |code| !has_test(code))),
@@ -76,7 +79,8 @@ fn summary_words(summary: &SummaryView, found: &[String], profile: Profile) -> S
 /// Whether a wrong unit explains the faults as well, as a warning says.
 fn is_excused(summary: &SummaryView) -> bool {
     let unclear = |outcome| outcome == Outcome::CannotTell;
-    summary.outcome.is_some_and(unclear) && !summary.monitors.iter().any(|m| unclear(m.outcome))
+    let mut found = summary.monitors.iter().filter(|m| summary.faults.contains(&m.code));
+    summary.outcome.is_some_and(unclear) && !found.any(|m| unclear(m.outcome))
 }
 
 /// The codes with a result that are `wanted`.

@@ -3,9 +3,11 @@
 
 mod real_world;
 
-use offbd_core::diagnosis::{FaultMemory, Profile, Transition};
-use offbd_core::engine::{Admission, Engine, Input, Rejection, Rig, Setup, calibrate};
-use offbd_core::vocabulary::{FaultCode, FaultKind, FaultStatus, Sample};
+use offbd_core::diagnosis::{AxisCalibration, FaultMemory, Profile, Transition};
+use offbd_core::engine::{
+    Admission, Engine, Input, Misfit, Plausibility, Rejection, Rig, Setup, calibrate,
+};
+use offbd_core::vocabulary::{Axis, FaultCode, FaultKind, FaultStatus, Sample};
 use offbd_lab::simulation::{Disturbances, Fault, PidGains, Preset, Reference, SimulatedRig};
 use proptest::prelude::*;
 
@@ -71,6 +73,32 @@ fn healthy_rigs_are_silent() {
             let found = confirmed(&transitions(&setup, &samples));
             assert!(found.is_empty(), "{preset} {reference:?}: {found:?}");
         }
+    }
+}
+
+/// A servo that is off from the first sample on looks like a rig that was moved. Its level is named,
+/// with its size; that of a healthy session is not.
+#[test]
+fn another_level_than_that_of_the_sessions_is_named() {
+    let setup = learnt(Preset::Chapter);
+    let named = |fault: &str, seed: u64| {
+        let samples = session(Preset::Chapter, Reference::Steps, 40.0, seed, fault);
+        let mut engine = Engine::new(setup.clone(), FaultMemory::default());
+        for &sample in &samples {
+            engine.handle(Input::Sample(sample), &mut Vec::new());
+        }
+        let plausibility = Plausibility::of(&setup.rig, &samples);
+        plausibility.levels(&engine.session_offsets()).collect::<Vec<_>>()
+    };
+    for seed in 1..7 {
+        assert_eq!(named("", seed), [], "{seed}");
+        let found = named("y_servo:offset=-0.05@0", seed);
+        let [Misfit::Level { axis: Axis::Y, off_rad, spread_rad }] = found[..] else {
+            panic!("{seed}: {found:?}");
+        };
+        assert!((off_rad - 0.05).abs() < 0.005, "{off_rad}");
+        assert_eq!(spread_rad, AxisCalibration::POPULATION_LEVEL_SPREAD_RAD);
+        assert_eq!(found[0].doubted_servo(), Some(FaultCode::YServo));
     }
 }
 

@@ -444,6 +444,7 @@ Misfit: TypeAlias = Literal[
     "wrong_sign",
     "scale",
     "no_room",
+    "level",
 ]
 """
 A contradiction between data and asset file.

@@ -19,7 +19,8 @@ pub enum Outcome {
     #[serde(rename = "fault")]
     Fault,
     /// A fault was confirmed, but causes in different parts of the rig, or a wrong unit of the
-    /// positions, would explain it equally.
+    /// positions, would explain it equally; or none was, and the level of a servo's axis differs from
+    /// that of the rig's sessions, which a servo that is off explains as well as a rig that was moved.
     #[serde(rename = "cannot tell")]
     CannotTell,
     /// A test has failed, and nothing was confirmed.
@@ -179,12 +180,15 @@ pub(super) fn is_ambiguous(suspicion: &Suspicion) -> bool {
     suspicion.candidates.iter().any(|c| Some(c.code) != first)
 }
 
+fn outcomes(monitors: &[JudgedView]) -> Vec<Outcome> {
+    monitors.iter().map(|monitor| monitor.outcome).collect()
+}
+
 impl SummaryView {
     /// Adds the results of the monitors, and the result of the session that follows.
     #[must_use]
     pub fn with_monitors(self, monitors: Vec<JudgedView>) -> Self {
-        let each: Vec<Outcome> = monitors.iter().map(|m| m.outcome).collect();
-        Self { outcome: Some(Outcome::of_session(&each)), monitors, ..self }
+        Self { outcome: Some(Outcome::of_session(&outcomes(&monitors))), monitors, ..self }
     }
 
     /// Adds the root mean square of the residual along each axis, m/s².
@@ -195,9 +199,18 @@ impl SummaryView {
 
     /// Adds the warnings of `misfits`. If one of them prevents judging and nothing was found,
     /// the result is [`Outcome::NotJudged`]; if one explains what was found as well as a fault
-    /// of the servos, it is [`Outcome::CannotTell`].
+    /// of the servos, or leaves a servo in doubt of which nothing was found, it is
+    /// [`Outcome::CannotTell`].
     #[must_use]
-    pub fn with_misfits(self, misfits: &[Misfit]) -> Self {
+    pub fn with_misfits(mut self, misfits: &[Misfit]) -> Self {
+        for doubted in misfits.iter().filter_map(|misfit| misfit.doubted_servo()) {
+            let of_servo =
+                |m: &&mut JudgedView| m.code == doubted.into() && m.outcome == Outcome::NoFault;
+            if let Some(monitor) = self.monitors.iter_mut().find(of_servo) {
+                monitor.outcome = Outcome::CannotTell;
+                self.outcome = Some(Outcome::of_session(&outcomes(&self.monitors)));
+            }
+        }
         let any = |of: fn(Misfit) -> bool| misfits.iter().copied().any(of);
         let servos_only = || self.faults.iter().all(|code| FaultCode::from(*code).axis().is_some());
         let outcome = match self.outcome {
@@ -216,7 +229,7 @@ impl SummaryView {
 mod tests {
     use super::*;
     use offbd_core::diagnosis::{Candidate, Evidence, StatusByte, Transition};
-    use offbd_core::vocabulary::{FaultKind, FaultStatus, SimTime};
+    use offbd_core::vocabulary::{Axis, FaultKind, FaultStatus, SimTime};
 
     /// Returns the result of a confirmed stuck ball with these candidates.
     fn stuck(candidates: Vec<Candidate>) -> JudgedView {
@@ -258,6 +271,32 @@ mod tests {
         assert_eq!(outcome(FaultCode::XServo, scale(true)), Some(Outcome::CannotTell));
         assert_eq!(outcome(FaultCode::XServo, scale(false)), Some(Outcome::Fault));
         assert_eq!(outcome(FaultCode::Sensor, scale(true)), Some(Outcome::Fault));
+    }
+
+    #[test]
+    fn another_level_leaves_only_a_servo_that_was_judged_in_doubt() {
+        let level = Misfit::Level { axis: Axis::Y, off_rad: 0.05, spread_rad: 0.02 };
+        let outcomes = |y_servo: Outcome| {
+            let monitor = |code: FaultCode, outcome| JudgedView {
+                code: code.into(),
+                judged_s: 20.0,
+                judged_share: 1.0,
+                outcome,
+                candidates: Vec::new(),
+                kinds: Vec::new(),
+            };
+            let monitors = vec![
+                monitor(FaultCode::XServo, Outcome::NoFault),
+                monitor(FaultCode::YServo, y_servo),
+            ];
+            let summary = Verdict::default().summary("a", 2000, 0, 20.0).with_monitors(monitors);
+            let found = summary.with_misfits(&[level]);
+            (found.outcome.unwrap(), found.monitors[0].outcome, found.monitors[1].outcome)
+        };
+        use Outcome::{CannotTell, Fault, NoFault, NotJudged, PartlyJudged};
+        assert_eq!(outcomes(NoFault), (CannotTell, NoFault, CannotTell));
+        assert_eq!(outcomes(NotJudged), (PartlyJudged, NoFault, NotJudged));
+        assert_eq!(outcomes(Fault), (Fault, NoFault, Fault));
     }
 
     #[test]

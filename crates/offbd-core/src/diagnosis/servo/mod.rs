@@ -395,6 +395,12 @@ impl ServoFilterBank {
         self.steady_m_s2
     }
 
+    /// The offset of this session and its standard error, m/s²; zero before the ball has moved.
+    #[must_use]
+    pub fn session_offset(&self) -> (f64, f64) {
+        (self.steady_m_s2, self.healthy.parameter(0).1.sqrt())
+    }
+
     /// When the evidence began to accumulate: Page's estimate of the onset.
     #[must_use]
     pub fn rising_since(&self) -> Option<SimTime> {

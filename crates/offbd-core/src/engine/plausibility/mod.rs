@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Rig;
 use super::frame::{Moment, moment};
-use crate::vocabulary::{Axis, PerAxis, Sample};
+use crate::vocabulary::{Axis, FaultCode, PerAxis, Sample};
 
 /// Least number of samples, readings or commands for a fraction of them to count. Chosen:
 /// they arrive within a second.
@@ -58,6 +58,9 @@ const SCALES: [f64; 3] = [10.0, 100.0, 1000.0];
 /// Largest factor between the motion and a tenth (and so on) of what is expected: a quarter of a
 /// decade, 10^0.25. Chosen: half the distance at which another power of ten is as near.
 const SCALE_FACTOR: f64 = 1.778;
+/// Distance of a session's level from that of the rig's sessions from which on it is named, in their
+/// standard deviations. Chosen: of normally distributed levels 5 % are farther away.
+const LEVEL_SPREADS: f64 = 2.0;
 /// One degree in radians.
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
@@ -163,6 +166,18 @@ pub enum Misfit {
         share: f64,
         radius_m: f64,
     },
+    #[error(
+        "along {axis} the plate lies {:.1}° off the level of the rig's sessions, which differ by {:.1}°: \
+         was the rig moved, or is the {axis} servo off?",
+        off_rad / DEGREE, spread_rad / DEGREE, axis = axis.as_str()
+    )]
+    Level {
+        axis: Axis,
+        /// Difference between the session's level and that of the calibration, rad.
+        off_rad: f64,
+        /// Standard deviation of the levels of the rig's sessions, rad.
+        spread_rad: f64,
+    },
 }
 
 impl Misfit {
@@ -183,6 +198,7 @@ impl Misfit {
             Self::WrongSign { .. } => "wrong_sign",
             Self::Scale { .. } => "scale",
             Self::NoRoom { .. } => "no_room",
+            Self::Level { .. } => "level",
         }
     }
 
@@ -198,6 +214,7 @@ impl Misfit {
                 | Self::WrongSign { .. }
                 | Self::Scale { scattered: false, .. }
                 | Self::NoRoom { .. }
+                | Self::Level { .. }
         )
     }
 
@@ -205,6 +222,15 @@ impl Misfit {
     #[must_use]
     pub const fn excuses_servos(self) -> bool {
         matches!(self, Self::Scale { scattered: true, .. })
+    }
+
+    /// The servo for which "no fault" would be said too soon: a fault of it would look the same.
+    #[must_use]
+    pub const fn doubted_servo(self) -> Option<FaultCode> {
+        match self {
+            Self::Level { axis, .. } => Some(FaultCode::servo(axis)),
+            _ => None,
+        }
     }
 
     /// Whether it can be the reason why a rig cannot be learnt from a session.
@@ -313,6 +339,7 @@ struct SeenAxis {
 struct CalibratedAxis {
     gain: f64,
     noise_m: f64,
+    level_spread_rad: f64,
 }
 
 /// The comparison of one session's samples with the description of its rig.
@@ -337,7 +364,13 @@ impl Plausibility {
         Self {
             responses: ResponseCorrelator::new(rig.sample_rate_hz),
             learnt: rig.calibration.as_ref().map(|c| {
-                c.axes.map(|axis| axis.map(|a| CalibratedAxis { gain: a.gain, noise_m: a.noise_m }))
+                c.axes.map(|axis| {
+                    axis.map(|a| CalibratedAxis {
+                        gain: a.gain,
+                        noise_m: a.noise_m,
+                        level_spread_rad: a.level_spread_rad,
+                    })
+                })
             }),
             rig: Rig { calibration: None, ..rig.clone() },
             span_s: None,
@@ -558,6 +591,22 @@ impl Plausibility {
         let factor = SCALES[scale];
         let unit_m = self.rig.mapping.position_unit_m;
         Some(Misfit::Scale { ratio: mean.exp(), factor, unit_m, scattered })
+    }
+
+    /// Compares the level of each axis in this session with that of the rig's sessions; `offsets` are
+    /// the accelerations that it causes, with their standard errors, m/s². Nothing without a
+    /// calibration. An offset of a servo from the first sample on is such a level: nothing in the session
+    /// tells them apart.
+    pub fn levels(&self, offsets: &PerAxis<(f64, f64)>) -> impl Iterator<Item = Misfit> {
+        Axis::ALL.into_iter().filter_map(|axis| {
+            let learnt = self.learnt_axis(axis)?;
+            let slope_m_s2 = learnt.gain * self.rig.ball.rolling_gravity();
+            let (offset_m_s2, error_m_s2) = offsets[axis];
+            let (off_rad, error_rad) = ((offset_m_s2 / slope_m_s2).abs(), error_m_s2 / slope_m_s2);
+            let spread_rad = learnt.level_spread_rad;
+            let is_off = off_rad > LEVEL_SPREADS * spread_rad.hypot(error_rad);
+            is_off.then_some(Misfit::Level { axis, off_rad, spread_rad })
+        })
     }
 
     fn learnt_axis(&self, axis: Axis) -> Option<CalibratedAxis> {
