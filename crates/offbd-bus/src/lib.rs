@@ -21,6 +21,9 @@
 //!
 //! Contains no SQL and no engines, and reads no configuration.
 
+// Without a bus nobody uses what both have in common.
+#![cfg_attr(not(any(feature = "nats", feature = "mqtt")), allow(dead_code))]
+
 mod batch_id;
 #[cfg(feature = "nats")]
 mod callout;

@@ -29,6 +29,8 @@ const BESIDE: [f64; 4] = [128.0, 22.0, 16.0, 100.0];
 const ROW: f64 = 44.0;
 /// Width of a sample in the legend, and space after it and after its name, pixels.
 const SAMPLE: [f64; 3] = [70.0, 14.0, 36.0];
+/// Digit to which coordinates are drawn, pixels.
+const DRAWN_PIXELS: f64 = 0.1;
 /// Limits of the height of a panel with equal scales, pixels; chosen to be readable.
 const HEIGHTS: (f64, f64) = (600.0, 1400.0);
 
@@ -203,13 +205,15 @@ impl Drawing {
     fn stroke(&mut self, points: &[Pixel], look: Look, stroke: Stroke) {
         let mut line: Vec<Pixel> = Vec::new();
         for (i, &(x, y)) in points.iter().enumerate() {
-            if i + 1 == points.len() || line.last().is_none_or(|b| (b.0 - x).hypot(b.1 - y) >= 1.0)
-            {
+            let away = line.last().map_or(f64::INFINITY, |b| (b.0 - x).hypot(b.1 - y));
+            if away >= 1.0 || i + 1 == points.len() && away >= DRAWN_PIXELS {
                 line.push((x, y));
             }
         }
         let dash = look.dash.map(|(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
         match stroke {
+            // What stays where it is has no line.
+            _ if line.len() < 2 => {}
             Stroke::Markers => {}
             Stroke::Front => self.line(&line, 16.0, &look.colour(), " stroke-opacity=\"0.3\""),
             _ => self.line(&line, 4.0, &look.colour(), &dash.unwrap_or_default()),
@@ -374,6 +378,8 @@ impl<'a> Axes<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::chart::Axis;
 
@@ -390,6 +396,21 @@ mod tests {
         let ends: Vec<f64> =
             points.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
         (ends[2] - ends[0]).hypot(ends[3] - ends[1])
+    }
+
+    #[test]
+    fn what_stays_where_it_is_has_no_line() {
+        let (x, y, panel_height) = equal_scales((-1.0, 1.0), (-1.0, 1.0));
+        let mut panel = Panel::new("", Axis::new("x", x), Axis::new("y", y));
+        panel.series.push(Series::new("rests", Look::of(0), Stroke::Line, vec![(0.1, 0.1); 3]));
+        let (title, subtitle) = ("t".to_owned(), "s".to_owned());
+        let drawing =
+            svg(&Figure { title, subtitle, columns: 1, panel_height, panels: vec![panel] });
+        for line in drawing.lines().filter(|line| line.contains("<polyline")) {
+            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+            let points: BTreeSet<&str> = points.split(' ').collect();
+            assert!(points.len() > 1, "{line}");
+        }
     }
 
     #[test]
