@@ -47,7 +47,7 @@ use serde::{Deserialize, Serialize};
 
 use super::foreign_file::{ForeignFileError, HEAD_BYTES, check_own};
 use super::session_csv;
-use super::table::{CsvError, NamedColumns, RowError, TableOptions, TableReader};
+use super::table::{CsvError, NamedColumns, RowError, TableOptions, TableReader, encoding};
 use super::telemetry::sample_view;
 
 /// A format of session files.
@@ -153,7 +153,7 @@ impl fmt::Display for SessionFormat {
 
 /// Whether a file that begins with `head` is a JSON document with rows or columns.
 fn is_json(head: &[u8]) -> bool {
-    let head = head.strip_prefix("\u{feff}".as_bytes()).unwrap_or(head);
+    let head = encoding::decoded(head);
     let mut bytes = head.iter().filter(|byte| !byte.is_ascii_whitespace());
     match bytes.next() {
         Some(b'{') => true,
@@ -595,6 +595,29 @@ mod tests {
             (b"[s],[m]\n0,1\n", SessionFormat::Csv),
         ] {
             assert_eq!(SessionFormat::of(head), format, "{head:?}");
+        }
+    }
+
+    /// Windows PowerShell writes UTF-16, other programs the code page of Windows.
+    #[test]
+    fn json_is_read_in_the_encodings_of_texts() {
+        let text = "[{\"t_s\": 0, \"cmd_qy_rad\": 0.5, \"x_m\": 0.25, \"größe\": 1}]";
+        let wide = |bytes: fn(u16) -> [u8; 2]| text.encode_utf16().flat_map(bytes).collect();
+        let (little, big): (Vec<u8>, Vec<u8>) = (wide(u16::to_le_bytes), wide(u16::to_be_bytes));
+        let narrow = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+        for (bytes, name) in [
+            (text.as_bytes().to_vec(), "UTF-8"),
+            ([&b"\xff\xfe"[..], &little].concat(), "UTF-16 LE with a mark"),
+            ([&b"\xfe\xff"[..], &big].concat(), "UTF-16 BE with a mark"),
+            (little, "UTF-16 LE"),
+            (big, "UTF-16 BE"),
+            (narrow, "Windows-1252"),
+        ] {
+            assert_eq!(SessionFormat::of(&bytes), SessionFormat::Json, "{name}");
+            let rows = open(io::Cursor::new(bytes), None, &TableOptions::default()).unwrap();
+            let samples: Vec<Sample> = rows.map(Result::unwrap).collect();
+            assert_eq!(samples.len(), 1, "{name}");
+            assert_eq!((samples[0].cmd_qy_rad, samples[0].x_m), (Some(0.5), Some(0.25)), "{name}");
         }
     }
 

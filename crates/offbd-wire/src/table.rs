@@ -11,7 +11,7 @@ mod cell;
 mod clock;
 mod columns;
 mod dialect;
-mod encoding;
+pub(crate) mod encoding;
 mod expression;
 pub(crate) mod guess;
 mod own_names;

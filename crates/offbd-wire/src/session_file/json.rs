@@ -18,6 +18,7 @@ use serde_json::Value;
 
 use super::line::{LONGEST_CELL, line_of, write_line};
 use super::{SessionFileError, SessionFormat, TextKind};
+use crate::table::encoding;
 use crate::telemetry::lenient::with_quotes;
 
 /// Longest document, bytes. Chosen: a million rows of five numbers with their names.
@@ -62,10 +63,10 @@ pub(crate) fn table(source: impl Read) -> Result<JsonTable, SessionFileError> {
         let limit = MAX_JSON_BYTES;
         return Err(SessionFileError::TooLong { what: "the JSON document", limit });
     }
-    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
-    match table_within(bytes, MAX_TEXT_BYTES) {
+    let bytes = encoding::decoded(&bytes);
+    match table_within(&bytes, MAX_TEXT_BYTES) {
         // Python writes `NaN`, which is not JSON.
-        Err(SessionFileError::Damaged { reason, format }) => match with_quotes(bytes) {
+        Err(SessionFileError::Damaged { reason, format }) => match with_quotes(&bytes) {
             Some(quoted) => table_within(&quoted, MAX_TEXT_BYTES),
             None => Err(SessionFileError::Damaged { reason, format }),
         },

@@ -1,5 +1,6 @@
 //! The encoding of a text file: UTF-8, UTF-16 or, if it is neither, Windows-1252.
 
+use std::borrow::Cow;
 use std::io::{self, BufReader, Read};
 
 use encoding_rs::{CoderResult, Decoder, Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
@@ -34,6 +35,17 @@ fn without_mark(head: &[u8]) -> &'static Encoding {
         // A character that the end of the head cuts is not an error.
         _ => UTF_8,
     }
+}
+
+/// Returns a whole text as UTF-8, without its byte order mark; what is not UTF-8 is left to the parser.
+pub(crate) fn decoded(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let (encoding, mark) = detect(bytes);
+    let bytes = &bytes[mark..];
+    if encoding == UTF_8 {
+        return Cow::Borrowed(bytes);
+    }
+    let (text, _) = encoding.decode_without_bom_handling(bytes);
+    Cow::Owned(text.into_owned().into_bytes())
 }
 
 /// Returns `source`, which is in `encoding`, as UTF-8.
