@@ -275,6 +275,7 @@ mod tests {
 
     #[test]
     fn another_level_leaves_only_a_servo_that_was_judged_in_doubt() {
+        use Outcome::{CannotTell, Fault, NoFault, NotJudged, PartlyJudged};
         let level = Misfit::Level { axis: Axis::Y, off_rad: 0.05, spread_rad: 0.02 };
         let outcomes = |y_servo: Outcome| {
             let monitor = |code: FaultCode, outcome| JudgedView {
@@ -285,15 +286,12 @@ mod tests {
                 candidates: Vec::new(),
                 kinds: Vec::new(),
             };
-            let monitors = vec![
-                monitor(FaultCode::XServo, Outcome::NoFault),
-                monitor(FaultCode::YServo, y_servo),
-            ];
+            let monitors =
+                vec![monitor(FaultCode::XServo, NoFault), monitor(FaultCode::YServo, y_servo)];
             let summary = Verdict::default().summary("a", 2000, 0, 20.0).with_monitors(monitors);
             let found = summary.with_misfits(&[level]);
             (found.outcome.unwrap(), found.monitors[0].outcome, found.monitors[1].outcome)
         };
-        use Outcome::{CannotTell, Fault, NoFault, NotJudged, PartlyJudged};
         assert_eq!(outcomes(NoFault), (CannotTell, NoFault, CannotTell));
         assert_eq!(outcomes(NotJudged), (PartlyJudged, NoFault, NotJudged));
         assert_eq!(outcomes(Fault), (Fault, NoFault, Fault));
