@@ -155,3 +155,22 @@ fn that_samples_have_numbers_is_remembered_after_a_step() {
     clock.believed(clock.newest_s + 60.0, 0.01, false);
     assert!(is_late(&clock.take(None, clock.newest_s - 30.0, IN_STRETCH)));
 }
+
+#[test]
+fn the_interval_is_that_of_the_samples_followed_or_believed() {
+    let mut clock = Followed::new(2000, 0.02, false);
+    assert!((clock.clock.interval_s() - 0.02).abs() < 1e-9, "{}", clock.clock.interval_s());
+    clock.believed(START_S + 500.0, 0.05, !IN_STRETCH);
+    assert!((clock.clock.interval_s() - 0.05).abs() < 1e-9, "{}", clock.clock.interval_s());
+}
+
+#[test]
+fn samples_of_one_time_do_not_shorten_the_interval() {
+    let mut clock = Followed::new(100, 0.01, true);
+    let before_s = clock.clock.interval_s();
+    let newest_s = clock.newest_s;
+    for seq in 100..200 {
+        assert_eq!(clock.take(Some(seq), newest_s, IN_STRETCH), ClockDecision::Follows);
+    }
+    assert_eq!(clock.clock.interval_s(), before_s);
+}
