@@ -174,3 +174,11 @@ fn samples_of_one_time_do_not_shorten_the_interval() {
     }
     assert_eq!(clock.clock.interval_s(), before_s);
 }
+
+#[test]
+fn believed_samples_of_one_time_do_not_make_the_interval_zero() {
+    let mut clock = Followed::new(100, 0.01, false);
+    let before_s = clock.clock.interval_s();
+    clock.believed(START_S + 500.0, 0.0, !IN_STRETCH);
+    assert_eq!(clock.clock.interval_s(), before_s);
+}
