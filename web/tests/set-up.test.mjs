@@ -145,6 +145,32 @@ test("a description that was changed is the one that is changed next", async () 
   await view.done();
 });
 
+test("a step that is opened while the description is saved stays open", async () => {
+  await ask(service.url, "POST", "/assets", { name: "slow" });
+  const view = await page(chromium);
+  await view.goto(`${service.url}/rigs/slow/set-up`);
+  await view.getByLabel("Mass").fill("51");
+  let release;
+  const held = new Promise((resolve) => (release = resolve));
+  await view.route("**/assets/slow", async (route) => {
+    if (route.request().method() === "PUT") await held;
+    await route.continue();
+  });
+  await view.getByRole("button", { name: "Save and continue" }).click();
+  await view.getByRole("button", { name: "4. Calibrate" }).click();
+  const current = view.locator("li[aria-current=step]");
+  await current.filter({ hasText: "Calibrate" }).waitFor();
+  const isRead = (response) =>
+    response.request().method() === "GET" && response.url().endsWith("/assets/slow");
+  const read = view.waitForResponse(isRead);
+  release();
+  await (await read).finished();
+  await view.evaluate(() => new Promise(requestAnimationFrame));
+  assert.match(await current.textContent(), /Calibrate/);
+  assert.equal((await ask(service.url, "GET", "/assets/slow")).ball.mass_kg, 0.051);
+  await view.done();
+});
+
 test("a recording without motion is refused with a message", async () => {
   await ask(service.url, "POST", "/assets", { name: "still" });
   const lines = Array.from({ length: 3000 }, (_, i) => `${(i / 100).toFixed(2)},0,0,0.01,0.01`);

@@ -155,7 +155,7 @@ impl Judging {
     /// Contradictions between the data and the rig's description.
     #[must_use]
     pub fn misfits(&self) -> Vec<Misfit> {
-        let offsets = self.engine.session_offsets();
+        let offsets = self.engine.steady_offsets();
         let levels = self.plausibility.levels(&offsets);
         // A confirmed or suspected servo needs no doubt.
         let is_open = |m: &Misfit| m.doubted_servo().is_none_or(|code| !self.verdict.accuses(code));

@@ -92,8 +92,8 @@ impl<K> Default for Keys<K> {
 
 impl<K: Key> Keys<K> {
     fn recognise(&self, key: K, fingerprint: impl FnOnce() -> u32) -> Recognition {
-        let newest = self.recent.back();
-        if newest.is_none_or(|&newest| key > newest) && self.dropped.is_none_or(|d| key > d) {
+        // Those that were dropped are older than all that are remembered.
+        if self.recent.back().is_none_or(|&newest| key > newest) {
             return Recognition::New;
         }
         let at = self.recent.partition_point(|&k| k < key);

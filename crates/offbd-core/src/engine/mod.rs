@@ -353,11 +353,12 @@ impl Engine {
         self.pipeline.servo_estimates()
     }
 
-    /// Returns the offset of each servo in this session, as an acceleration of the ball, and its standard
-    /// error, m/s²: averaged over the last 20 s, of a servo that is taken for healthy.
+    /// Returns the offset of each servo in this session, averaged over the last 20 s, as an acceleration
+    /// of the ball, and its standard error, m/s²; zero before the ball has moved. A fault that has just
+    /// begun hardly affects it.
     #[must_use]
-    pub fn session_offsets(&self) -> PerAxis<(f64, f64)> {
-        self.pipeline.session_offsets()
+    pub fn steady_offsets(&self) -> PerAxis<(f64, f64)> {
+        self.pipeline.steady_offsets()
     }
 
     /// Notes that a sample was rejected by the caller, who has looked it up, or could not read

@@ -596,8 +596,11 @@ impl Pipeline {
     }
 
     /// Returns the offset of each servo in this session, and its standard error, m/s².
-    pub(super) fn session_offsets(&self) -> PerAxis<(f64, f64)> {
-        PerAxis::from_fn(|axis| self.servos[axis].session_offset())
+    pub(super) fn steady_offsets(&self) -> PerAxis<(f64, f64)> {
+        PerAxis::from_fn(|axis| {
+            let servo = &self.servos[axis];
+            (servo.steady_m_s2(), servo.steady_error_m_s2())
+        })
     }
 
     /// Largest evidence against each servo so far, nats, scaled to the evidence that

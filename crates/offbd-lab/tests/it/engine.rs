@@ -88,7 +88,7 @@ fn another_level_than_that_of_the_sessions_is_named() {
             engine.handle(Input::Sample(sample), &mut Vec::new());
         }
         let plausibility = Plausibility::of(&setup.rig, &samples);
-        plausibility.levels(&engine.session_offsets()).collect::<Vec<_>>()
+        plausibility.levels(&engine.steady_offsets()).collect::<Vec<_>>()
     };
     for seed in 1..7 {
         assert_eq!(named("", seed), [], "{seed}");

@@ -395,10 +395,10 @@ impl ServoFilterBank {
         self.steady_m_s2
     }
 
-    /// The offset of this session and its standard error, m/s²; zero before the ball has moved.
+    /// Standard error of the offset of this session, m/s².
     #[must_use]
-    pub fn session_offset(&self) -> (f64, f64) {
-        (self.steady_m_s2, self.healthy.parameter(0).1.sqrt())
+    pub fn steady_error_m_s2(&self) -> f64 {
+        self.healthy.parameter(0).1.sqrt()
     }
 
     /// When the evidence began to accumulate: Page's estimate of the onset.
@@ -407,9 +407,9 @@ impl ServoFilterBank {
         self.rising_since.and_then(SimTime::new)
     }
 
-    /// The response of the servo relative to the twin's: since there is evidence for a fault, or
-    /// the recent one, whose kinds are told if its monitor is `suspicious`: the residual may confirm a
-    /// fault before the evidence is enough to follow it.
+    /// The response of the servo relative to the twin's: since there is evidence for a fault, or else
+    /// the recent response. The recent one has kinds only if the servo's monitor is `suspicious`,
+    /// because the residual may confirm a fault before there is enough evidence to follow it.
     #[must_use]
     pub fn answer(&self, suspicious: bool) -> ServoAnswer {
         match self.staying.as_ref().and_then(|staying| staying.answer()) {
