@@ -121,8 +121,11 @@ fn configuration(
 ) -> PyResult<Configuration> {
     suits(&scene.scene, model).map_err(unusable)?;
     let method = method.unwrap_or_else(|| model.usual_method());
-    let pace = step_s.map_or(Pace::Tolerance(tolerance_m), Pace::Step);
-    Configuration::new(model, method, pace).map_err(unusable)
+    let configuration = match step_s {
+        Some(step_s) => Configuration::new(model, method, Pace::Step(step_s)),
+        None => Configuration::within(model, method, tolerance_m),
+    };
+    configuration.map_err(unusable)
 }
 
 fn table(rows: &[(f64, Motion)]) -> PyResult<Table> {

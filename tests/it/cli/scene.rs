@@ -115,6 +115,44 @@ fn validate_the_requested_tolerance_is_kept() {
     assert!(off < 1e-6, "{off}");
 }
 
+/// A landing within a fixed step of an implicit method, which a single step answers with
+/// metres, is divided; a tolerance is kept through it.
+#[test]
+fn an_implicit_method_takes_a_landing() {
+    let cli = CliFixture::new();
+    cli.ok("scene steep --tolerance 1e-7 -o truth --sample 0.002");
+    let truth = rows(&cli, "truth/trajectory.csv");
+    let rodas = "scene steep --model compliant --method rodas4 --sample 0.002";
+    for (pace, within) in [("--step 0.001", 2e-3), ("--tolerance 1e-3", 1e-3)] {
+        let done = cli.ok(&format!("{rodas} {pace} -o out --format json"));
+        let off = largest_distance(&rows(&cli, "out/trajectory.csv"), &truth);
+        assert!(off < within, "{pace}: {off} m");
+        assert!(!done.stderr.contains("warning"), "{pace}: {}", done.stderr);
+        let divided = object(&done)["divided"].as_u64().unwrap();
+        assert_eq!(divided > 1, pace.contains("step"), "{pace}: {divided} steps divided");
+    }
+    let rolls = "scene slope --model compliant --method rodas4 --step 0.001 --format json";
+    assert_eq!(object(&cli.ok(rolls))["divided"], 0);
+    let said = cli.ok(&format!("{rodas} --step 0.001")).stdout;
+    assert!(said.contains("divided, where the contact changes"), "{said}");
+    let said = cli.ok(&format!("{rodas} --tolerance 1e-3")).stdout;
+    assert!(said.contains("the smaller tolerance is to keep 0.001 m"), "{said}");
+}
+
+/// The limits are those of the chapter's slope (docs/benchmarks.md), at the weight of a level
+/// plate.
+#[test]
+fn a_step_that_is_not_stable_causes_a_warning() {
+    let cli = CliFixture::new();
+    let warned = |line: &str| cli.ok(&format!("scene slope --model compliant {line}")).stderr;
+    let chatters = warned("--method rk4 --step 5e-5");
+    assert!(chatters.contains("rk4 above 1.352e-5 s lets the slip chatter"), "{chatters}");
+    let thrown = warned("--method rk4 --step 1.6e-4");
+    assert!(thrown.contains("rk4 above 1.481e-4 s is not stable"), "{thrown}");
+    assert_eq!(warned("--method rk4 --step 1e-5"), "");
+    assert_eq!(warned("--method contact-step --step 0.01"), "");
+}
+
 /// v = v_thr·tan(angle)/μ along x; along y it is larger by the factor 1/cos(qy), because the
 /// normal force is smaller.
 #[test]
@@ -229,6 +267,13 @@ fn an_unreachable_tolerance_is_explained() {
     assert!(done.stderr.contains("no model and method meets 1e-12 m"), "{}", done.stderr);
     assert!(done.stderr.contains("rodas4"), "{}", done.stderr);
     assert_eq!(done.stdout, "");
+    let too_fine = "scene steep --model compliant --method rodas4 --tolerance 1e-12";
+    let done = cli.run(2, too_fine);
+    assert!(
+        done.stderr.contains("--tolerance: must be at least 2e-11 m to be kept"),
+        "{}",
+        done.stderr
+    );
 }
 
 #[test]
@@ -256,10 +301,10 @@ fn missing_options_are_filled_in() {
         ("--model compliant --step 1e-4", "compliant", "contact-step"),
         ("--model compliant --method rk4", "compliant", "rk4"),
         ("--model sliding", "sliding", "dopri5"),
-        ("--method rk4", "compliant", "rk4"),
+        ("--method rk4", "rolling", "rk4"),
         ("--method rodas3", "compliant", "rodas3"),
         ("--method zoh", "planar", "zoh"),
-        ("--step 0.002", "compliant", "contact-step"),
+        ("--step 0.002", "rolling", "rk4"),
     ] {
         let result = object(&cli.ok(&format!("scene slope {options} --format json")));
         assert_eq!(

@@ -95,6 +95,12 @@ impl SimulatedTwin {
         (self.rates, self.now) = (rates, to);
     }
 
+    /// The time that the twin has reached.
+    #[must_use]
+    pub const fn now(&self) -> SimTime {
+        self.now
+    }
+
     /// The motion of the ball.
     #[must_use]
     pub fn ball(&self) -> RollingState {

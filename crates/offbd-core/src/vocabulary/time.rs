@@ -11,7 +11,16 @@ pub(crate) const CLOCK_RESOLUTION_S: f64 = 1e-3;
 ///
 /// It comes from the samples (`t_s`); the core never reads a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "f64")]
 pub struct SimTime(f64);
+
+impl TryFrom<f64> for SimTime {
+    type Error = &'static str;
+
+    fn try_from(seconds: f64) -> Result<Self, Self::Error> {
+        Self::new(seconds).ok_or("a time is not finite")
+    }
+}
 
 impl SimTime {
     /// Returns the time `seconds` after the clock's zero; `None` unless it is finite.

@@ -26,8 +26,8 @@ pub(super) struct ConfigurationArgs {
     #[arg(long, value_name = "S", conflicts_with = "tolerance", allow_negative_numbers = true,
           value_parser = positive_number)]
     pub step: Option<f64>,
-    /// Wanted accuracy of the position, m; with a model named, the tolerance of
-    /// its method [default: 1e-4]
+    /// Wanted accuracy of the position, m; with a model named, that of its method
+    /// [default: 1e-4]
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = positive_number)]
     pub tolerance: Option<f64>,
     /// Search for the cheapest model and method by trial runs, for a scene that
@@ -67,7 +67,7 @@ const STEP_S: f64 = 1e-3;
 pub(super) struct Decision {
     /// `None` for a run in one pass.
     pub configuration: Option<Configuration>,
-    /// The accuracy requested from `auto`, m.
+    /// The requested accuracy, m.
     pub wanted_m: Option<f64>,
     /// The choice of `auto`, if it was requested.
     pub choice: Option<Choice>,
@@ -85,12 +85,7 @@ pub(super) struct NoModelMeets {
 
 impl From<OutOfReach> for NoModelMeets {
     fn from(none: OutOfReach) -> Self {
-        let OutOfReach { tolerance_m, best_m, tried } = none;
-        let why = format!(
-            "no model and method meets {tolerance_m:e} m here; the best accuracy is about \
-             {best_m:.1e} m"
-        );
-        Self { why, tried }
+        Self { why: none.to_string(), tried: none.tried }
     }
 }
 
@@ -120,7 +115,11 @@ impl ConfigurationArgs {
     ) -> anyhow::Result<Decision> {
         if let Some(model) = self.model.0 {
             let configuration = Some(self.configured(scene, model)?);
-            return Ok(Decision { configuration, wanted_m: None, choice: None, choosing_s: 0.0 });
+            let paced = configuration.map(|by| by.pace());
+            let by_tolerance = matches!(paced, Some(Pace::Tolerance(_)));
+            let wanted_m = by_tolerance.then_some(self.tolerance.unwrap_or(TOLERANCE_M));
+            let choice = None;
+            return Ok(Decision { configuration, wanted_m, choice, choosing_s: 0.0 });
         }
         let wanted_m = self.tolerance.unwrap_or(TOLERANCE_M);
         if !(1e-12..=1.0).contains(&wanted_m) {
@@ -163,13 +162,15 @@ impl ConfigurationArgs {
         let fixed = self.step.is_some();
         let usual = if fixed { fixed_method(model) } else { model.usual_method() };
         let method = self.method.0.unwrap_or(usual);
-        let pace = match (self.step, self.tolerance) {
-            (Some(step), _) => Pace::Step(step),
-            (None, Some(tolerance)) => Pace::Tolerance(tolerance),
-            (None, None) if method.adapts() => Pace::Tolerance(TOLERANCE_M),
-            (None, None) => Pace::Step(usual_step(scene, model, method)),
+        let step = match (self.step, self.tolerance) {
+            (None, None) if !method.adapts() => Some(usual_step(scene, model, method)),
+            (step, _) => step,
         };
-        Ok(Configuration::new(model, method, pace).map_err(bad)?)
+        let configuration = match step {
+            Some(step) => Configuration::new(model, method, Pace::Step(step)),
+            None => Configuration::within(model, method, self.tolerance.unwrap_or(TOLERANCE_M)),
+        };
+        Ok(configuration.map_err(bad)?)
     }
 }
 

@@ -63,7 +63,15 @@ fn why(scene_run: &SceneRun) -> String {
         );
     };
     let Some(choice) = &decision.choice else {
-        return "asked for".to_owned();
+        return match by.pace() {
+            Pace::Tolerance(tolerance) if tolerance < wanted => {
+                format!(
+                    "asked for; the smaller tolerance is to keep {} m where the body lands or leaves",
+                    words::plain(wanted)
+                )
+            }
+            _ => "asked for".to_owned(),
+        };
     };
     if choice.configuration == *by {
         return format!("the cheapest that meets {} m", words::plain(wanted));
@@ -127,12 +135,16 @@ fn effort(scene_run: &SceneRun) -> Vec<String> {
         0 => String::new(),
         n => format!(" and {n} rejected"),
     };
+    let divided = match outcome.statistics.divided {
+        0 => String::new(),
+        n => format!("; {n} divided, where the contact changes"),
+    };
     let choosing = match scene_run.decision.choosing_s {
         0.0 => String::new(),
         s => format!(", {} to choose", words::work(s)),
     };
     vec![
-        row("steps", &format!("{}{rejected}", outcome.statistics.steps)),
+        row("steps", &format!("{}{rejected}{divided}", outcome.statistics.steps)),
         row("CPU time", &format!("{} to run{choosing}", words::work(scene_run.running_s))),
     ]
 }
@@ -192,6 +204,7 @@ pub(super) fn object(scene_run: &SceneRun) -> Value {
         "tried": choice.map(|c| c.tried.iter().map(tried_object).collect::<Vec<_>>()),
         "steps": statistics.map(|t| t.steps),
         "rejected": statistics.map(|t| t.rejected),
+        "divided": statistics.map(|t| t.divided),
         "cpu_s": scene_run.running_s,
         "choosing_cpu_s": decision.choosing_s,
         "end": outcome.as_ref().ok().map(|o| motion_object(&o.end)),

@@ -1,10 +1,11 @@
 //! Runs a scene: the decision, the result, and warnings.
 
 use super::decide::{ConfigurationArgs, Decision, NoModelMeets, TOLERANCE_M};
-use offbd_core::plant::Motion;
+use super::words;
+use offbd_core::plant::{GRAVITY_M_S2, Motion};
 use offbd_lab::scene::{
     Configuration, Drive, Event, Failure, Method, Model, OnePass, Pace, RunOutcome, Samples, Scene,
-    Stage, Subject, Survey, one_pass, run,
+    Stage, StepLimits, Subject, Survey, one_pass, run,
 };
 use offbd_lab::timing::cpu_once;
 use offbd_terminal::errors::BadArgument;
@@ -129,7 +130,7 @@ fn look<D: Drive + Clone>(scene: &Scene, drive: &D) -> (Survey, Vec<Event>) {
     (survey, told.map(|outcome| outcome.events).unwrap_or_default())
 }
 
-/// Returns warnings if a requested model is not valid for this scene.
+/// Returns warnings if a requested model is not valid for this scene, or a step not stable.
 fn warnings(
     scene: &Scene,
     configuration: &Configuration,
@@ -137,6 +138,9 @@ fn warnings(
     events: &[Event],
 ) -> Vec<String> {
     let model = configuration.model();
+    if let Some(limits) = unstable(scene, configuration) {
+        return vec![limits];
+    }
     if !matches!(model, Model::Planar | Model::Rolling | Model::Creeping) {
         return Vec::new();
     }
@@ -161,4 +165,22 @@ fn warnings(
         )];
     }
     Vec::new()
+}
+
+/// Returns a warning if a fixed step of an explicit method is too long for the contact.
+fn unstable(scene: &Scene, by: &Configuration) -> Option<String> {
+    let (Model::Compliant, Pace::Step(step)) = (by.model(), by.pace()) else { return None };
+    let method = by.method();
+    let limits = StepLimits::of(method, &scene.compliant(), GRAVITY_M_S2)?;
+    let [stable, normal] = [limits.least_s(), limits.normal_s].map(words::plain);
+    if step > limits.normal_s {
+        let what = "the contact throws the body off";
+        return Some(format!("{method} above {normal} s is not stable: {what}"));
+    }
+    (step > limits.slip_s).then(|| {
+        format!(
+            "{method} above {stable} s lets the slip chatter: the position hardly shows it, but \
+             slip and friction losses are too large"
+        )
+    })
 }

@@ -75,8 +75,15 @@ impl Compliant {
     }
 
     #[inline]
-    pub(super) fn touches(&self, p: &Vector3<f64>) -> bool {
+    pub(crate) fn touches(&self, p: &Vector3<f64>) -> bool {
         p.z < self.body.rest_height_m() && self.ground.margin_m(p.x, p.y) > 0.0
+    }
+
+    /// Returns whether the Jacobian contains the contact. A body that just touches counts as
+    /// in contact: otherwise an implicit step from there would be an explicit one.
+    #[inline]
+    pub(crate) fn has_contact_derivatives(&self, p: &Vector3<f64>) -> bool {
+        p.z <= self.body.rest_height_m() && self.ground.margin_m(p.x, p.y) > 0.0
     }
 
     /// Returns the derivatives of (p, v, w) under the plate's motion.
@@ -143,10 +150,7 @@ impl Compliant {
 
     /// Returns the derivatives of the contact force.
     fn contact_derivatives(&self, at: &Motion) -> ContactDerivatives {
-        let (p, height) = (&at.position, self.body.rest_height_m());
-        // A body that just touches counts as in contact: otherwise an implicit step from
-        // there would be an explicit one.
-        if p.z > height || self.ground.margin_m(p.x, p.y) <= 0.0 {
+        if !self.has_contact_derivatives(&at.position) {
             return ContactDerivatives::default();
         }
         let force = self.force(at);

@@ -15,6 +15,12 @@ pub enum Model {
     Compliant,
 }
 
+/// Tolerance of an implicit method as a share of the accuracy that it is to keep, and at
+/// most, m. Chosen: RODAS errs by up to 13 times its tolerance on random scenes, and above
+/// 1e-4 m it misses that a ball just leaves the plate.
+const KEEPING_SHARE: f64 = 0.05;
+const COARSEST_KEEPING_M: f64 = 5e-5;
+
 /// A numerical method that steps a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -112,6 +118,17 @@ impl Method {
         }
     }
 
+    /// Returns the tolerance at which the error of the position stays within `wanted_m`, m:
+    /// a smaller one for an implicit method, whose error a landing or a take-off can make
+    /// larger than its estimates.
+    #[must_use]
+    pub const fn tolerance_to_keep(self, wanted_m: f64) -> f64 {
+        match self {
+            Self::Rodas3 | Self::Rodas4 => (wanted_m * KEEPING_SHARE).min(COARSEST_KEEPING_M),
+            _ => wanted_m,
+        }
+    }
+
     /// Returns whether the method adapts its step size to a tolerance.
     #[must_use]
     pub const fn adapts(self) -> bool {
@@ -171,6 +188,9 @@ pub const SHORTEST_STEP_S: f64 = 1e-9;
 /// The longest step, s; chosen.
 pub const LONGEST_STEP_S: f64 = 10.0;
 
+/// The finest tolerance, m; chosen: below it, rounding errors outweigh the gain.
+pub(super) const FINEST_M: f64 = 1e-12;
+
 /// A model, a method that can step it, and a pace that the method accepts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Configuration {
@@ -202,7 +222,7 @@ impl Configuration {
                 }
             }
             Pace::Tolerance(tolerance) => {
-                offbd_core::vocabulary::in_range("/tolerance", tolerance, 1e-12..=1.0)?;
+                offbd_core::vocabulary::in_range("/tolerance", tolerance, FINEST_M..=1.0)?;
                 if !method.adapts() {
                     let reason = format!("{method} takes fixed steps: give a step");
                     return Err(Invalid::new("/tolerance", reason));
@@ -210,6 +230,23 @@ impl Configuration {
             }
         }
         Ok(Self { model, method, pace })
+    }
+
+    /// Returns the configuration that is to keep the error of the position within
+    /// `accuracy_m`, in [1e-12, 1] m, by its method's own tolerance; see
+    /// [`Method::tolerance_to_keep`].
+    ///
+    /// # Errors
+    /// As [`Self::new`], also where the method's own tolerance would be below 1e-12 m.
+    pub fn within(model: Model, method: Method, accuracy_m: f64) -> Result<Self, Invalid> {
+        let asked = Self::new(model, method, Pace::Tolerance(accuracy_m))?;
+        let tolerance_m = method.tolerance_to_keep(accuracy_m);
+        if tolerance_m < FINEST_M {
+            let least_m = FINEST_M / KEEPING_SHARE;
+            let reason = format!("must be at least {least_m:.0e} m to be kept by {method}");
+            return Err(Invalid::new("/tolerance", reason));
+        }
+        Ok(Self { pace: Pace::Tolerance(tolerance_m), ..asked })
     }
 
     #[must_use]

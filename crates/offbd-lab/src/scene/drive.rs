@@ -32,6 +32,13 @@ pub trait Drive {
         ])
     }
 
+    /// Returns the plate's motion at `M` times from `from` on, `every` seconds apart, within
+    /// the current piece.
+    #[inline]
+    fn grid<const M: usize>(&self, from: f64, every: f64) -> PlateNodes<M> {
+        self.nodes(&std::array::from_fn(|i| from + i as f64 * every))
+    }
+
     /// Returns the force on the body's centre along x and y in the current piece, N.
     fn push(&self) -> Vector2<f64>;
 
@@ -85,6 +92,13 @@ impl<const M: usize> PlateNodes<M> {
         Self { omega: rows(&plate.omega), alpha: rows(&plate.alpha), gravity: rows(&plate.gravity) }
     }
 
+    /// Returns the motion at the `i`-th time.
+    #[inline]
+    pub(super) fn motion(&self, i: usize) -> PlateMotion {
+        let at = |rows: &[[f64; M]; 3]| Vector3::new(rows[0][i], rows[1][i], rows[2][i]);
+        PlateMotion { omega: at(&self.omega), alpha: at(&self.alpha), gravity: at(&self.gravity) }
+    }
+
     /// Adds an external force along x and y, given per mass, m/s².
     #[inline]
     pub(super) fn pushed(mut self, acceleration: Vector2<f64>) -> Self {
@@ -132,6 +146,12 @@ impl Drive for Laws {
     #[inline]
     fn nodes<const M: usize>(&self, at: &[f64; M]) -> PlateNodes<M> {
         PlateNodes::of(&[self.qx.nodes(at, self.inside), self.qy.nodes(at, self.inside)])
+    }
+
+    #[inline]
+    fn grid<const M: usize>(&self, from: f64, every: f64) -> PlateNodes<M> {
+        let [x, y] = [&self.qx, &self.qy].map(|law| law.grid(from, every, self.inside));
+        PlateNodes::of(&[x, y])
     }
 
     fn push(&self) -> Vector2<f64> {
@@ -189,6 +209,12 @@ impl<'a, D: Drive> DrivenPlate<'a, D> {
     /// Returns whether the plate stands still throughout the piece.
     pub(super) const fn is_still(&self) -> bool {
         self.still.is_some()
+    }
+
+    /// Returns the plate's motion at `M` times from `from` on, `every` seconds apart.
+    #[inline]
+    pub(super) fn grid<const M: usize>(&self, from: f64, every: f64) -> PlateNodes<M> {
+        self.drive.grid(from, every).pushed(self.push)
     }
 
     #[inline]

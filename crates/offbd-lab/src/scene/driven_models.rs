@@ -3,7 +3,7 @@
 use super::drive::{Drive, DrivenPlate};
 use crate::methods::Stiff;
 use crate::models::{Compliant, Creeping};
-use offbd_core::maths::System;
+use offbd_core::maths::{System, moved};
 use offbd_core::plant::{Motion, Phase, PlateMotion, Rolling, Sliding};
 
 /// A model on a driven plate: a system whose state represents a motion.
@@ -34,6 +34,13 @@ pub(super) trait RollingModel {
     /// them, wz).
     fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5];
 
+    /// Returns the state after a step of `h` seconds by the explicit midpoint rule, with
+    /// the plate at the middle of the step for both stages.
+    fn midpoint(&self, y: &[f64; 5], plate: &PlateMotion, h: f64) -> [f64; 5] {
+        let middle = moved(y, &self.rate(y, plate), h / 2.0);
+        moved(y, &self.rate(&middle, plate), h)
+    }
+
     /// Returns the state for a ball in the motion `from`.
     fn enter(&self, from: &Motion, plate: &PlateMotion) -> [f64; 5];
 
@@ -45,6 +52,11 @@ impl RollingModel for Rolling {
     #[inline]
     fn rate(&self, y: &[f64; 5], plate: &PlateMotion) -> [f64; 5] {
         self.rate(y, plate)
+    }
+
+    #[inline]
+    fn midpoint(&self, y: &[f64; 5], plate: &PlateMotion, h: f64) -> [f64; 5] {
+        self.midpoint(y, plate, h)
     }
 
     fn enter(&self, from: &Motion, _: &PlateMotion) -> [f64; 5] {
@@ -127,6 +139,22 @@ impl<D: Drive> System<9> for DrivenCompliant<'_, D> {
     #[inline]
     fn rate(&self, t: f64, y: &[f64; 9]) -> [f64; 9] {
         self.model.rate(y, &self.plate.at(t))
+    }
+}
+
+impl<D: Drive> DrivenCompliant<'_, D> {
+    /// Returns whether the body stays in contact, or out of reach of the plate, in a step of
+    /// `h` seconds from `t` between these states, and whether no slip grows too fast for it.
+    pub(super) fn keeps_contact(&self, t: f64, [from, to]: [&[f64; 9]; 2], h: f64) -> bool {
+        let (from, to) = (Motion::from_row(from), Motion::from_row(to));
+        let touches = self.model.touches(&to.position);
+        if self.model.has_contact_derivatives(&from.position) {
+            let grows_s = self.model.slip_growth_s(&from).min(self.model.slip_growth_s(&to));
+            return touches && h <= LONGEST_IN_GROWTH * grows_s;
+        }
+        let gap = from.position.z - self.model.body.rest_height_m();
+        let a = self.plate.at(t).free(&from.position, &from.velocity);
+        !touches && gap.abs() > from.velocity.z.abs() * h + a.z.abs() * h * h
     }
 }
 

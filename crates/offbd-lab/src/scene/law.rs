@@ -91,25 +91,55 @@ impl Law {
     #[must_use]
     #[inline(always)]
     pub fn nodes<const M: usize>(&self, at: &[f64; M], inside: f64) -> AngleNodes<M> {
+        self.summed(at, inside, |omega, phase| {
+            let mut wave = Wave { sin: [0.0; M], cos: [0.0; M] };
+            for (i, t) in at.iter().enumerate() {
+                (wave.sin[i], wave.cos[i]) = sin_cos(omega * t + phase);
+            }
+            wave
+        })
+    }
+
+    /// Returns angle, rate and acceleration at `M` times from `from` on, `every` seconds
+    /// apart, as [`Self::at`]: the sines by a recurrence.
+    #[must_use]
+    #[inline(always)]
+    pub fn grid<const M: usize>(&self, from: f64, every: f64, inside: f64) -> AngleNodes<M> {
+        let at: [f64; M] = std::array::from_fn(|i| from + i as f64 * every);
+        self.summed(&at, inside, |omega, phase| Wave::turning(omega * from + phase, omega * every))
+    }
+
+    /// Sums the terms at the times `at`, a sine by the `wave` of its frequency, rad/s, and
+    /// phase, rad.
+    #[inline(always)]
+    fn summed<const M: usize>(
+        &self,
+        at: &[f64; M],
+        inside: f64,
+        wave: impl Fn(f64, f64) -> Wave<M>,
+    ) -> AngleNodes<M> {
         let mut sum =
             AngleNodes { angle: [self.constant; M], rate: [0.0; M], acceleration: [0.0; M] };
         for term in &self.varying {
-            let mut add = |i: usize, [angle, rate, acceleration]: [f64; 3]| {
-                sum.angle[i] += angle;
-                sum.rate[i] += rate;
-                sum.acceleration[i] += acceleration;
-            };
             match *term {
                 // Without a branch in the loop, which the compiler then vectorises.
                 Term::Sine { amplitude, frequency, phase } if in_reach(frequency, phase, at) => {
                     let omega = TAU * frequency;
-                    for (i, t) in at.iter().enumerate() {
-                        let (sin, cos) = sin_cos(omega * t + phase);
-                        let rate = amplitude * omega;
-                        add(i, [amplitude * sin, rate * cos, -rate * omega * sin]);
+                    let (wave, rate) = (wave(omega, phase), amplitude * omega);
+                    for i in 0..M {
+                        sum.angle[i] += amplitude * wave.sin[i];
+                        sum.rate[i] += rate * wave.cos[i];
+                        sum.acceleration[i] -= rate * omega * wave.sin[i];
                     }
                 }
-                _ => (0..M).for_each(|i| add(i, varying(term, at[i], inside))),
+                _ => {
+                    for (i, &t) in at.iter().enumerate() {
+                        let [angle, rate, acceleration] = varying(term, t, inside);
+                        sum.angle[i] += angle;
+                        sum.rate[i] += rate;
+                        sum.acceleration[i] += acceleration;
+                    }
+                }
             }
         }
         sum
@@ -146,6 +176,33 @@ impl Law {
             Term::Constant(_) => f64::INFINITY,
         });
         times.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Sine and cosine at several times.
+struct Wave<const M: usize> {
+    sin: [f64; M],
+    cos: [f64; M],
+}
+
+impl<const M: usize> Wave<M> {
+    /// Returns the wave at the angles `start + i·step`, rad. Each angle is reached by at most
+    /// log₂ M + 1 rotations of the first, each with an error of some 1e-16.
+    #[inline(always)]
+    fn turning(start: f64, step: f64) -> Self {
+        let mut wave = Self { sin: [0.0; M], cos: [0.0; M] };
+        (wave.sin[0], wave.cos[0]) = sin_cos(start);
+        let (mut sin, mut cos) = sin_cos(step);
+        let mut known = 1;
+        while known < M {
+            for i in 0..known.min(M - known) {
+                wave.sin[known + i] = wave.sin[i] * cos + wave.cos[i] * sin;
+                wave.cos[known + i] = wave.cos[i] * cos - wave.sin[i] * sin;
+            }
+            (sin, cos) = (2.0 * sin * cos, (cos - sin) * (cos + sin));
+            known *= 2;
+        }
+        wave
     }
 }
 
@@ -203,6 +260,22 @@ mod tests {
     }
 
     proptest! {
+        /// The recurrence agrees with each time by itself: an argument of at most 1000 rad
+        /// has a rounding error of 1.1e-13 rad, each of five rotations one of 2e-16.
+        #[test]
+        fn a_grid_is_the_law_at_its_times(from in -20.0..20.0_f64, every in 0.0..0.1_f64) {
+            let law = law();
+            let grid = law.grid::<16>(from, every, 0.2);
+            for i in 0..16 {
+                let at = law.at(from + i as f64 * every, 0.2);
+                let found = [grid.angle[i], grid.rate[i], grid.acceleration[i]];
+                for (found, expected) in found.into_iter().zip(at) {
+                    let allowed = 1e-14 * (1.0 + expected.abs());
+                    prop_assert!((found - expected).abs() <= allowed, "{i}: {found} {expected}");
+                }
+            }
+        }
+
         /// Rate and acceleration agree with difference quotients.
         #[test]
         fn rates_are_derivatives(t in 0.0..0.4_f64) {

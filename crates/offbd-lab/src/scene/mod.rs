@@ -4,19 +4,17 @@
 //! A run is specified by data: a model, a method and a pace. The integration loops are
 //! generic over all three. The module uses no files, clock or faults.
 
-mod candidates;
 mod configuration;
 mod controlled;
 mod drive;
 mod driven_models;
 mod events;
-mod ladder;
 mod law;
 mod one_pass;
-mod reference;
-mod rolling_check;
 mod run;
 mod samples;
+mod search;
+mod step_limits;
 mod stepping;
 mod survey;
 
@@ -24,11 +22,12 @@ pub use configuration::{Configuration, LONGEST_STEP_S, Method, Model, Pace, SHOR
 pub use controlled::{ControlLoop, ControlStep, ControlledPlate};
 pub use drive::{Drive, Laws, PlateNodes, Push};
 pub use events::{Event, MOST_EVENTS};
-pub use ladder::{Choice, OutOfReach, TriedCandidate, choose};
 pub use law::{AngleNodes, Law, Term};
 pub use one_pass::{Declined, OnePass, Stage, one_pass};
 pub use run::{RunOutcome, run, suits};
 pub use samples::{Samples, Sink};
+pub use search::{Choice, OutOfReach, TriedCandidate, choose};
+pub use step_limits::StepLimits;
 pub use stepping::{Failure, MOST_STEPS, RunStatistics};
 pub use survey::Survey;
 

@@ -14,10 +14,10 @@ use super::stepping::{
     whole_steps,
 };
 use super::{Scene, Subject};
-use crate::methods::{RODAS3, RODAS4, StepControl};
+use crate::methods::{RODAS3, RODAS4, Rosenbrock, StepControl};
 use crate::models::{Compliant, ContactStep, Creeping};
 use offbd_core::maths::{DOPRI5, EULER, MIDPOINT, RK4, dopri5, semi_implicit_euler};
-use offbd_core::plant::{Ball, Motion, Phase, Planar, Rolling, RollingState, Sliding};
+use offbd_core::plant::{Ball, Motion, Phase, Planar, PlateMotion, Rolling, RollingState, Sliding};
 use offbd_core::vocabulary::Invalid;
 
 /// The result of a run.
@@ -54,12 +54,8 @@ pub(super) fn run_within<D: Drive>(
     let runner = SceneRunner::new(most_steps, scene, configuration);
     match configuration.model() {
         Model::Planar => runner.planar(drive, samples),
-        Model::Rolling => {
-            runner.rolling(|ball| scene.rolling(ball), drive, samples, &mut NoObserver)
-        }
-        Model::Creeping => {
-            runner.rolling(|ball| scene.creeping(ball), drive, samples, &mut NoObserver)
-        }
+        Model::Rolling => runner.rolling(|ball| scene.rolling(ball), drive, samples),
+        Model::Creeping => runner.rolling(|ball| scene.creeping(ball), drive, samples),
         Model::Sliding => runner.sliding(drive, samples, &mut NoObserver),
         Model::Compliant => runner.compliant(drive, samples, &mut NoObserver),
     }
@@ -198,16 +194,12 @@ impl<'a> SceneRunner<'a> {
     }
 
     /// Runs the rolling or the creeping ball.
-    pub(super) fn rolling<D: Drive, M: RollingModel, W>(
+    fn rolling<D: Drive, M: RollingModel>(
         &self,
         model: impl Fn(&Ball) -> M,
         drive: &mut D,
         samples: Option<&mut Samples<'_>>,
-        observer: &mut W,
-    ) -> Result<RunOutcome, Failure>
-    where
-        W: for<'p> StepObserver<DrivenRolling<'p, M, D>, 5>,
-    {
+    ) -> Result<RunOutcome, Failure> {
         let Subject::Ball(ball) = &self.scene.subject else {
             return Err(Failure::OutOfRange { at_s: 0.0, why: "a block does not roll" });
         };
@@ -222,7 +214,14 @@ impl<'a> SceneRunner<'a> {
         let end = self.pieces(drive, &mut integration, motion, |drive, integration, until| {
             let system =
                 DrivenRolling { model, plate: DrivenPlate::new(drive, mass, integration.t) };
-            self.explicit(&system, integration, until, (&mut control, &budget), observer)
+            if let (Method::Midpoint, Pace::Step(h)) = (self.method, self.pace) {
+                let plate = &system.plate;
+                let step = |y: &[f64; 5], plate: &PlateMotion, h| model.midpoint(y, plate, h);
+                integration.by_middles((&system, plate), until, h, &mut NoObserver, step)
+            } else {
+                let adaptive = (&mut control, &budget);
+                self.explicit(&system, integration, until, adaptive, &mut NoObserver)
+            }
         })?;
         Ok(RunOutcome { end, statistics: integration.statistics, events: Vec::new() })
     }
@@ -358,14 +357,10 @@ impl<'a> SceneRunner<'a> {
                 contact_steps(system, integration, until, h, observer)
             }
             (Method::Rodas3, Pace::Step(h)) => {
-                integration.fixed(system, until, h, observer, |r, t, y, h| {
-                    RODAS3.step(r, t, y, h).map_or([f64::NAN; 9], |to| to.y)
-                })
+                self.fixed_implicit(&RODAS3, system, integration, until, h, observer)
             }
             (Method::Rodas4, Pace::Step(h)) => {
-                integration.fixed(system, until, h, observer, |r, t, y, h| {
-                    RODAS4.step(r, t, y, h).map_or([f64::NAN; 9], |to| to.y)
-                })
+                self.fixed_implicit(&RODAS4, system, integration, until, h, observer)
             }
             (Method::Rodas3, _) => {
                 integration.adaptive(system, until, adaptive, observer, |r, t, y, h, _| {
@@ -380,7 +375,46 @@ impl<'a> SceneRunner<'a> {
             _ => self.explicit(system, integration, until, adaptive, observer),
         }
     }
+
+    /// Integrates one piece of the compliant model by fixed steps of an implicit method. A
+    /// step in which the contact begins or ends, or in which a slip grows, is divided: the
+    /// method takes its Jacobian where the step begins, and would be an explicit one there.
+    fn fixed_implicit<'p, D: Drive, const S: usize>(
+        &self,
+        method: &Rosenbrock<S>,
+        system: &DrivenCompliant<'p, D>,
+        integration: &mut Integration<'_, '_, 9>,
+        until: f64,
+        h: f64,
+        observer: &mut impl StepObserver<DrivenCompliant<'p, D>, 9>,
+    ) -> Result<(), Failure> {
+        let n = whole_steps(until - integration.t, h);
+        let h = (until - integration.t) / n as f64;
+        let budget = ErrorBudget { tolerance: DIVIDED_M, ..self.budget() };
+        for i in 1..=n {
+            let (t, y) = (integration.t, integration.y);
+            let end = if i == n { until } else { t + h };
+            let tried = method.step(system, t, &y, h);
+            let whole = tried.filter(|to| system.keeps_contact(t, [&y, &to.y], h));
+            if let Some(to) = whole {
+                integration.take(system, end, to.y, observer)?;
+                continue;
+            }
+            integration.statistics.divided += 1;
+            let power = f64::from(method.order) - 0.5;
+            let longest = h.max(SHORTEST_STEP_S);
+            let mut control =
+                StepControl::new(power, FIRST_STEP_S.min(h), SHORTEST_STEP_S, longest);
+            let by = (&mut control, &budget);
+            integration
+                .adaptive(system, end, by, observer, |r, t, y, h, _| method.step(r, t, y, h))?;
+        }
+        Ok(())
+    }
 }
+
+/// Tolerance of the divided steps, m; chosen: it costs some tens of steps a landing.
+const DIVIDED_M: f64 = 1e-6;
 
 /// Integrates one piece by contact steps of at most `h`, s.
 fn contact_steps<'p, D: Drive>(
@@ -392,8 +426,8 @@ fn contact_steps<'p, D: Drive>(
 ) -> Result<(), Failure> {
     let steps = whole_steps(until - integration.t, h);
     let stepper = ContactStep::new(system.model, (until - integration.t) / steps as f64);
-    integration.fixed(system, until, h, observer, |r, t, y, h| {
-        stepper.step(&Motion::from_row(y), &r.plate.at(t + h / 2.0)).to_row()
+    integration.by_middles((system, &system.plate), until, h, observer, |y, plate, _| {
+        stepper.step(&Motion::from_row(y), plate).to_row()
     })
 }
 
@@ -419,6 +453,9 @@ fn planar_piece<D: Drive>(
     let h = (until - integration.t) / n as f64;
     for i in 1..=n {
         let t = if i == n { until } else { integration.t + h };
+        if integration.statistics.steps >= integration.most_steps {
+            return Err(Failure::TooManySteps { at_s: t });
+        }
         let angle = drive.tilt(integration.t + h / 2.0).angle;
         let from = xi_of(&integration.y);
         let y = row_of(&model.hold(&from, &angle, h));

@@ -1,5 +1,7 @@
 //! Samples at regular times, interpolated between the steps of a method.
 
+use nalgebra::Vector3;
+
 use super::configuration::SHORTEST_STEP_S;
 use offbd_core::plant::Motion;
 
@@ -10,6 +12,7 @@ pub type Sink<'a> = dyn FnMut(f64, &Motion) + 'a;
 pub struct Samples<'a> {
     every_s: f64,
     taken: u64,
+    whole_motions: bool,
     sink: &'a mut Sink<'a>,
 }
 
@@ -24,7 +27,17 @@ impl<'a> Samples<'a> {
     pub fn new(every_s: f64, sink: &'a mut Sink<'a>) -> Self {
         let every_s = if every_s >= SHORTEST_STEP_S { every_s } else { f64::MAX };
         let every_s = every_s.min(f64::MAX);
-        Self { every_s, taken: 0, sink }
+        Self { every_s, taken: 0, whole_motions: true, sink }
+    }
+
+    /// Takes samples whose positions along x and y alone are to be used, which costs less.
+    pub(super) fn of_positions(every_s: f64, sink: &'a mut Sink<'a>) -> Self {
+        Self { whole_motions: false, ..Self::new(every_s, sink) }
+    }
+
+    /// Returns whether more than the positions along x and y are to be used.
+    pub(super) const fn whole_motions(&self) -> bool {
+        self.whole_motions
     }
 
     fn next(&self) -> f64 {
@@ -81,6 +94,27 @@ impl<const N: usize> StepInterpolant<'_, N> {
     }
 }
 
+/// Returns the positions at `t` by the cubic with the positions and velocities of both ends
+/// of a step.
+pub(super) fn positions<const N: usize>(
+    t: f64,
+    ends: [f64; 2],
+    y: [&[f64; N]; 2],
+    positions: usize,
+) -> Vector3<f64> {
+    let h = ends[1] - ends[0];
+    let s = (t - ends[0]) / h;
+    let mut at = Vector3::zeros();
+    for i in 0..positions.min(3) {
+        let (from, to) = (y[0][i], y[1][i]);
+        let rates = [y[0][i + positions] * h, y[1][i + positions] * h];
+        let rise = to - from;
+        let bend = rates[0] + rates[1] - 2.0 * rise;
+        at[i] = from + s * (rates[0] + s * (rise - rates[0] - bend + s * bend));
+    }
+    at
+}
+
 /// Returns the second derivatives at both ends of the cubic with the values `y` and rates
 /// `v`, over a unit step.
 fn cubic_seconds(y: [f64; 2], v: [f64; 2]) -> [f64; 2] {
@@ -121,6 +155,17 @@ mod tests {
         };
         let y = interpolant.at(0.33, 1, true);
         assert!((y[0] - p(0.33)).abs() < 1e-14 && (y[1] - v(0.33)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn positions_are_those_of_whole_motions() {
+        let (y0, y1) = ([1.0, 2.0, -0.5, 0.3, 4.0, 1.0], [1.4, 1.0, 0.5, 2.3, -4.0, 0.0]);
+        let rate = [[0.3, 4.0, 1.0, 9.0, 9.0, 9.0], [2.3, -4.0, 0.0, 9.0, 9.0, 9.0]];
+        let whole = StepInterpolant { t: [0.2, 0.6], y: [&y0, &y1], rate }.at(0.33, 3, false);
+        let found = positions(0.33, [0.2, 0.6], [&y0, &y1], 3);
+        for i in 0..3 {
+            assert!((found[i] - whole[i]).abs() < 1e-15, "{i}: {} {}", found[i], whole[i]);
+        }
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! The integration loops for one smooth piece of a scene.
 
+use super::drive::{Drive, DrivenPlate};
 use super::driven_models::DrivenModel;
-use super::samples::{Samples, StepInterpolant};
+use super::samples::{Samples, StepInterpolant, positions};
 use crate::methods::StepControl;
 use offbd_core::maths::Estimated;
+use offbd_core::plant::{Motion, PlateMotion};
 
 /// Maximum number of steps of a run. Chosen: at 50 ns each they take about a minute.
 pub const MOST_STEPS: u64 = 1_000_000_000;
@@ -31,6 +33,9 @@ pub enum Failure {
 pub struct RunStatistics {
     pub steps: u64,
     pub rejected: u64,
+    /// Fixed steps of an implicit method that were divided, because the contact begins or
+    /// ends in them or a slip grows.
+    pub divided: u64,
     /// Sum of the method's error estimates, each as its effect on the position at the end
     /// of the scene, m: the error of position plus that of velocity times the time left.
     pub method_error_m: f64,
@@ -129,6 +134,14 @@ impl<const N: usize> Integration<'_, '_, N> {
     #[inline]
     fn sample<R: DrivenModel<N>>(&mut self, system: &R, t: f64, y: &[f64; N]) {
         let Some(samples) = self.samples.as_deref_mut() else { return };
+        if !R::SMOOTH && !samples.whole_motions() {
+            let (from, ends) = ([&self.y, y], [self.t, t]);
+            samples.take(t, |within| {
+                let position = positions(within.unwrap_or(t), ends, from, R::POSITIONS);
+                Motion { position, ..Motion::default() }
+            });
+            return;
+        }
         let mut interpolant: Option<StepInterpolant<'_, N>> = None;
         samples.take(t, |within| match within {
             None => system.motion(t, y),
@@ -160,6 +173,34 @@ impl<const N: usize> Integration<'_, '_, N> {
             // The last stage of a step and the first of the next share the same time.
             let t = if i == n { until } else { self.t + h };
             self.take(system, t, y, observer)?;
+        }
+        Ok(())
+    }
+
+    /// Integrates up to `until` by fixed steps of at most `h`, each with the plate at its
+    /// middle. The plate is evaluated for several steps at once.
+    #[inline]
+    pub(super) fn by_middles<R: DrivenModel<N>, D: Drive>(
+        &mut self,
+        (system, plate): (&R, &DrivenPlate<'_, D>),
+        until: f64,
+        h: f64,
+        observer: &mut impl StepObserver<R, N>,
+        step: impl Fn(&[f64; N], &PlateMotion, f64) -> [f64; N],
+    ) -> Result<(), Failure> {
+        let mut left = whole_steps(until - self.t, h);
+        let h = (until - self.t) / left as f64;
+        while left > 0 {
+            let first = self.t + h / 2.0;
+            let several = left >= TOGETHER as u64 && !plate.is_still();
+            let plates = several.then(|| plate.grid::<TOGETHER>(first, h));
+            for i in 0..if several { TOGETHER } else { 1 } {
+                left -= 1;
+                let t = if left == 0 { until } else { self.t + h };
+                let motion = plates.as_ref().map_or_else(|| plate.at(first), |all| all.motion(i));
+                let y = step(&self.y, &motion, h);
+                self.take(system, t, y, observer)?;
+            }
         }
         Ok(())
     }
@@ -202,6 +243,10 @@ impl<const N: usize> Integration<'_, '_, N> {
         Ok(())
     }
 }
+
+/// Number of steps for which the plate is evaluated at once. Chosen: enough for vectors
+/// and a recurrence, and few enough for the closest memory.
+const TOGETHER: usize = 16;
 
 /// Returns the number of equal steps of at most `h` that fill `duration`.
 pub(super) fn whole_steps(duration: f64, h: f64) -> u64 {

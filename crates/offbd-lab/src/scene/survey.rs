@@ -4,12 +4,10 @@
 //! The plate's motion is evaluated a few times per shortest time scale, with the ball at
 //! its start. That costs less than the cheapest run.
 
-use nalgebra::Vector2;
-
 use super::drive::{Drive, DrivenPlate};
 use super::{Scene, Subject};
 use crate::models::Creeping;
-use offbd_core::plant::{Ball, Grip, Motion, Planar, Rolling, RollingState, Tilt};
+use offbd_core::plant::{Ball, Grip, Motion, PlateMotion, Rolling};
 
 /// Evaluations per shortest time scale of the plate's motion; chosen.
 const LOOKS_PER_TIME: f64 = 4.0;
@@ -17,6 +15,10 @@ const LOOKS_PER_TIME: f64 = 4.0;
 /// Maximum number of evaluations of one scene, chosen to bound the cost; a longer scene
 /// is evaluated at longer intervals.
 const MOST_LOOKS: f64 = 64.0;
+
+/// Maximum friction demand at which the ball counts as rolling, as a fraction of the
+/// limit. Chosen below 1 as a margin for the estimates.
+pub(super) const SURE_TO_ROLL: f64 = 0.9;
 
 /// Maximum initial depth of a body that starts on the plate, m; chosen: more than the
 /// sag of a soft contact.
@@ -30,11 +32,6 @@ pub struct Survey {
     pub demand: f64,
     /// Whether the body starts on the plate with no more slip than its creep.
     pub starts_rolling: bool,
-    /// Error of the planar model, which assumes small angles, m.
-    pub planar_error_m: f64,
-    /// Step of the planar model whose constant angle causes an error of 1 m, s: the error
-    /// is proportional to the square of the step.
-    pub planar_step_s: f64,
     /// Error of the rolling model, which has neither creep nor sag, m.
     pub rolling_error_m: f64,
     /// Error of the creeping model, m.
@@ -69,10 +66,6 @@ struct WorstCase {
     sag: f64,
     /// Settling times of sag and creep, s.
     settling: [f64; 2],
-    /// Tilt of the plate, rad, with its rate and acceleration.
-    angle: f64,
-    rate: f64,
-    acceleration: f64,
 }
 
 impl WorstCase {
@@ -81,48 +74,11 @@ impl WorstCase {
         let n = ((until - from) / look).ceil().max(1.0) as u32;
         for i in 0..=n {
             let t = from + (until - from) * f64::from(i) / f64::from(n);
-            self.turn(&drive.tilt(t), drive.push().norm() / scene.body().mass_kg());
             self.look(scene, &plate.at(t));
         }
     }
 
-    /// Records angle, rate and acceleration of the plate. A push counts as an infinite
-    /// angle, because the planar model has no pushes.
-    fn turn(&mut self, tilt: &Tilt, push: f64) {
-        let angle = if push > 0.0 { f64::INFINITY } else { tilt.angle.norm() };
-        self.angle = self.angle.max(angle);
-        self.rate = self.rate.max(tilt.rate.norm());
-        self.acceleration = self.acceleration.max(tilt.acceleration.norm());
-    }
-
-    /// Returns the error of small angles, m, and [`Survey::planar_step_s`]. The bound
-    /// assumes that the plate stays at its largest values, and the ball at the largest
-    /// distance and speed that they cause.
-    fn planar(&self, scene: &Scene) -> (f64, f64) {
-        let (Subject::Ball(ball), t) = (&scene.subject, scene.duration_s) else {
-            return (f64::INFINITY, 0.0);
-        };
-        let (at, gain) = (&scene.initial, ball.rolling_gravity());
-        let speed = at.velocity.norm() + gain * self.angle * t;
-        let state = RollingState {
-            position: Vector2::new(at.position.xy().norm() + speed * t, 0.0),
-            velocity: Vector2::new(speed, 0.0),
-            spin: at.spin.z,
-        };
-        let worst = |size: f64| Vector2::new(size, 0.0);
-        let tilt = Tilt {
-            angle: worst(self.angle),
-            rate: worst(self.rate),
-            acceleration: worst(self.acceleration),
-        };
-        let left_out = Planar::new(ball, &scene.plate).left_out(&state, &tilt);
-        // The midpoint rule's error is h²/24 times the change of the rate, at most twice
-        // the largest rate; the error of velocity acts until the end of the scene.
-        let step = (12.0 / (gain * self.rate * t)).sqrt();
-        (left_out * t * t / 2.0, step)
-    }
-
-    fn look(&mut self, scene: &Scene, plate: &offbd_core::plant::PlateMotion) {
+    fn look(&mut self, scene: &Scene, plate: &PlateMotion) {
         let at = &scene.initial;
         match &scene.subject {
             Subject::Ball(ball) => {
@@ -161,7 +117,6 @@ impl WorstCase {
         // each part by its settling time.
         let parts = [self.sink, self.creep];
         let rolling = 1.5 * (parts[0] + parts[1]) * scene.duration_s + self.sag * self.demand;
-        let (planar_error_m, planar_step_s) = self.planar(scene);
         let part = |i: usize| {
             let lag = (std::f64::consts::TAU * self.settling[i] / shortest_time).min(1.0);
             parts[i] * (2.0 * scene.duration_s * lag + 4.0 * self.settling[i])
@@ -170,8 +125,6 @@ impl WorstCase {
         Survey {
             demand: self.demand,
             starts_rolling: starts_rolling(scene),
-            planar_error_m: planar_error_m + rolling,
-            planar_step_s,
             rolling_error_m: rolling,
             creeping_error_m: creeping,
         }

@@ -356,6 +356,30 @@ fn what_cannot_be_met_is_said() {
     let refusal = choose(&scene, &laws, 1e-12).unwrap_err();
     assert!(refusal.best_m > 1e-12 && refusal.best_m < 1e-6, "{refusal}");
     assert!(!refusal.tried.is_empty());
+    // The best accuracy is one for which there is a choice.
+    assert!(choose(&scene, &laws, refusal.best_m).unwrap().error_m <= refusal.best_m);
+}
+
+/// A plate that stands still for longer than the longest step has all its candidates.
+#[test]
+fn a_long_scene_has_the_cheapest_candidates() {
+    let (mut scene, laws) = scene("slope");
+    scene.duration_s = 30.0;
+    let tried = choose(&scene, &laws, 1e-3).unwrap().tried;
+    let stepped = [Method::ZeroOrderHold, Method::Midpoint];
+    assert!(stepped.iter().all(|m| tried.iter().any(|t| t.method == *m)), "{tried:?}");
+}
+
+/// A first piece shorter than the shortest step, in which the ball leaves the plate.
+#[test]
+fn fixed_implicit_steps_take_the_shortest_piece() {
+    let (mut scene, _) = scene("slope");
+    scene.initial.position.z += 1e-6;
+    let law = Law::new(&[Term::Smoothstep { to: 0.2, start: -0.3, duration: 0.3 + 1e-10 }]);
+    let laws = Laws::new(law.clone(), law, Vec::new());
+    let by = configuration(Model::Compliant, Method::Rodas4, Pace::Step(1e-3));
+    let end = run(&scene, &mut laws.clone(), &by, None).unwrap().end;
+    assert!(end.to_row().iter().all(|value| value.is_finite()));
 }
 
 /// Random numbers in [0, 1) from a seed: xorshift64 (Marsaglia 2003).
@@ -405,8 +429,8 @@ impl Dice {
 }
 
 /// On random scenes the choice meets the requested accuracy, compared with RODAS at
-/// 1e-10 m. Of 20 000 choices on 4000 such scenes one exceeded it, by a factor of 1.6, and
-/// two were declined, where runs of RODAS do not agree to 1e-7 m.
+/// 1e-10 m. Of 20 000 choices on 4000 such scenes two exceeded it, by factors of 1.06 and
+/// 1.15; none was declined.
 #[test]
 fn validate_the_choice_on_scenes_at_random() {
     let mut dice = Dice(0x9E37_79B9_7F4A_7C15);

@@ -459,8 +459,8 @@ class MonitorCertificate(TypedDict):
 
     alarms_per_hour: NotRequired[float | None]
     """
-    Expected false alarms per hour of operation, in [0, 1e6]; null if the monitor could
-    not judge.
+    Expected false alarms per hour of operation, in [0, 1e6]: the mean over rigs like this
+    one; null if the monitor could not judge.
     """
     code: FaultCode
     """
@@ -469,6 +469,11 @@ class MonitorCertificate(TypedDict):
     judged_s: float
     """
     Time of the recordings for which the monitor could judge, s, in [0, 1e9].
+    """
+    most_alarms_per_hour: NotRequired[float | None]
+    """
+    False alarms per hour that nine of ten such rigs stay below, in [0, 1e6]; null if
+    unknown, as in calibrations of earlier versions.
     """
     nearest: float
     """

@@ -2,8 +2,8 @@
 
 use super::map::{StabilityMap, Sweep, chapter_ratio};
 use super::measure::Fate;
-use super::theory::PredictedLimits;
 use crate::chart::{Axis, Category, Figure, Look, Marker, Panel, Regions, Scale, Series, Stroke};
+use crate::scene::StepLimits;
 
 /// A fate with its name, colour and marker.
 type FateStyle = (Fate, &'static str, (u8, u8, u8), Marker);
@@ -102,20 +102,20 @@ fn regions(map: &StabilityMap) -> Regions {
 
 /// Returns the predicted limits of both modes over the range swept.
 fn theory(map: &StabilityMap) -> Vec<Series> {
-    let predicted: Vec<(f64, PredictedLimits)> = map
+    let predicted: Vec<(f64, StepLimits)> = map
         .values
         .iter()
         .filter_map(|&value| {
             let held = map.sweep.held(value);
-            Some((value, PredictedLimits::of(map.method, &held.model, held.normal_m_s2())?))
+            Some((value, StepLimits::of(map.method, &held.model, held.normal_m_s2())?))
         })
         .collect();
-    let line = |name, look, limit: fn(&PredictedLimits) -> f64| {
+    let line = |name, look, limit: fn(&StepLimits) -> f64| {
         let points = predicted.iter().map(|(value, limits)| (*value, limit(limits))).collect();
         Series::new(name, look, Stroke::Line, points)
     };
     vec![
-        line("slip limit, predicted", SLIP, |limits| limits.slip),
-        line("normal limit, predicted", NORMAL, |limits| limits.normal),
+        line("slip limit, predicted", SLIP, |limits| limits.slip_s),
+        line("normal limit, predicted", NORMAL, |limits| limits.normal_s),
     ]
 }

@@ -1,10 +1,9 @@
 //! One map: the fate of a method over the step size and one parameter of the contact.
 
 use super::measure::{BallOnHeldPlate, Fate};
-use super::theory::PredictedLimits;
 use super::{StabilityLimitRecord, StabilityRecord};
 use crate::chart::Effort;
-use crate::scene::Method;
+use crate::scene::{Method, StepLimits};
 use offbd_core::plant::{Ball, Contact};
 
 /// The parameter of the contact that is swept; the others are the chapter's.
@@ -89,7 +88,7 @@ impl StabilityMap {
         let cells = steps.iter().flat_map(|&h| held.iter().map(move |held| held.fate(method, h)));
         let cells = cells.collect();
         let limits = values.iter().zip(&held).filter_map(|(&value, held)| {
-            let predicted = PredictedLimits::of(method, &held.model, held.normal_m_s2())?.least();
+            let predicted = StepLimits::of(method, &held.model, held.normal_m_s2())?.least_s();
             Some(MeasuredLimit { value, predicted, measured: measured(held, method, predicted)? })
         });
         let limits = limits.collect();

@@ -5,7 +5,6 @@
 mod draw;
 mod map;
 mod measure;
-mod theory;
 
 use serde::Serialize;
 

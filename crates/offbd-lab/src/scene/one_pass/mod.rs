@@ -23,15 +23,14 @@ use nalgebra::Vector3;
 
 use super::configuration::{Configuration, Method, Model, Pace};
 use super::drive::{Drive, DrivenPlate, PlateNodes};
-use super::rolling_check::SURE_TO_ROLL;
 use super::run::{RunOutcome, SceneRunner};
 use super::samples::Samples;
 use super::stepping::{MOST_STEPS, RunStatistics};
-use super::survey::starts_rolling;
+use super::survey::{SURE_TO_ROLL, starts_rolling};
 use super::{Scene, Subject};
 use crate::models::Creeping;
 use bound::ErrorBound;
-use nodes::{EIGHT, FOUR, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
+use nodes::{EIGHT, FOUR, Legendre, Nodes, SIXTEEN, TWELVE, TWENTY_FOUR};
 use offbd_core::plant::{Ball, GRAVITY_M_S2, Motion, PlateMotion};
 use slide::Slide;
 use window::{BallContact, Path, Rung, SagDecay, State, Window};
@@ -75,12 +74,6 @@ pub struct Declined {
     pub why: String,
 }
 
-/// Tolerance of RODAS as a share of the wanted accuracy, and at most, m. Chosen: on random
-/// scenes RODAS errs by up to 3.4 times its tolerance, and above 1e-4 m it misses that a
-/// ball just leaves the plate.
-const CONTACT_SHARE: f64 = 0.05;
-const COARSEST_M: f64 = 5e-5;
-
 /// Share of the wanted accuracy for the windows before the ball leaves the plate; chosen.
 const WINDOWS_SHARE: f64 = 0.5;
 
@@ -121,7 +114,7 @@ pub fn one_pass<D: Drive + Clone>(
     }
     let Left { at_s, motion, why } = &left.left;
     let declined = |why: String| Declined { tolerance_m, why };
-    let pace = Pace::Tolerance((tolerance_m * CONTACT_SHARE).min(COARSEST_M));
+    let pace = Pace::Tolerance(Method::Rodas4.tolerance_to_keep(tolerance_m));
     let by = Configuration::new(Model::Compliant, Method::Rodas4, pace).map_err(|_| {
         declined(format!("{why}, and the contact model would need a tolerance below 1e-12 m"))
     })?;
@@ -135,6 +128,11 @@ pub fn one_pass<D: Drive + Clone>(
 fn enter(stages: &mut Vec<Stage>, stage: Stage) {
     stages.pop_if(|last| last.from_s == stage.from_s);
     stages.push(stage);
+}
+
+/// Returns whether the ball stays on the plate, so that the run costs little.
+pub(super) fn rolls<D: Drive + Clone>(scene: &Scene, drive: &D, tolerance_m: f64) -> bool {
+    matches!(on_the_plate(scene, &mut drive.clone(), tolerance_m, None), Ran::Whole(_))
 }
 
 /// The motion at which the ball leaves the models on the plate.
@@ -163,6 +161,7 @@ impl HandOver {
         let statistics = RunStatistics {
             steps: before.steps + run.statistics.steps,
             rejected: before.rejected + run.statistics.rejected,
+            divided: 0,
             method_error_m: error_m,
         };
         OnePass { end: run.end, error_m, stages, statistics }
@@ -620,34 +619,66 @@ impl<'a, D: Drive> Pass<'a, D> {
         self.bound.carry(path.worst.growth, 2.0 * window.half, &added);
         if let Some(samples) = samples {
             let (start, half) = (self.t, window.half);
+            let mut series = None;
+            let whole = samples.whole_motions();
             samples.take(end, |within| {
+                let series = series.get_or_insert_with(|| WindowSeries::of(window, path));
                 let s = within.map_or(1.0, |t| (t - start) / half - 1.0);
-                self.sample(window, path, rung, s)
+                let legendre = Legendre::at(s);
+                if whole {
+                    let at = start + half * (1.0 + s);
+                    self.sample(at, series, &legendre, rung)
+                } else {
+                    let [x, y] = series.position(&legendre);
+                    Motion { position: Vector3::new(x, y, 0.0), ..Motion::default() }
+                }
             });
         }
         (self.t, self.state) = (end, path.end);
     }
 
-    /// Returns the motion at `s`, from −1 to 1, in a window.
+    /// Returns the motion at the time `t` within a window, at which `legendre` is.
     fn sample<const M: usize>(
         &self,
-        window: &Window<'_, M>,
-        path: &Path<M>,
+        t: f64,
+        series: &WindowSeries<M>,
+        legendre: &Legendre<M>,
         rung: Rung,
-        s: f64,
     ) -> Motion {
-        let Window { nodes, start, half, .. } = window;
-        let value = |f: &[f64; M]| nodes.value_and_integral(f, s)[0];
-        let [x, y] =
-            [0, 1].map(|a| start[a] + half * nodes.value_and_integral(&path.velocity(a), s)[1]);
-        let [u, v, w] = [0, 1, 2].map(|a| value(&path.free[a]));
-        let t = self.t + half * (1.0 + s);
+        let [x, y] = series.position(legendre);
+        let [u, v, w] = [0, 1, 2].map(|a| legendre.value(&series.free[a]));
         let plate = DrivenPlate::new(&*self.drive, self.scene.body().mass_kg(), t).at(t);
         let mut at = self.creeping.leave(&[x, y, u, v, w], &plate);
         if rung == Rung::Sagging {
-            self.sink(&mut at, value(&path.sag), &plate);
+            self.sink(&mut at, legendre.value(&series.sag), &plate);
         }
         at
+    }
+}
+
+/// The motion in a window as Legendre series.
+struct WindowSeries<const M: usize> {
+    start: [f64; 2],
+    half: f64,
+    velocity: [[f64; M]; 2],
+    free: [[f64; M]; 3],
+    sag: [f64; M],
+}
+
+impl<const M: usize> WindowSeries<M> {
+    fn of(window: &Window<'_, M>, path: &Path<M>) -> Self {
+        let Window { nodes, start, half, .. } = window;
+        Self {
+            start: [start[0], start[1]],
+            half: *half,
+            velocity: [0, 1].map(|a| nodes.coefficients(&path.velocity(a))),
+            free: [0, 1, 2].map(|a| nodes.coefficients(&path.free[a])),
+            sag: nodes.coefficients(&path.sag),
+        }
+    }
+
+    fn position(&self, legendre: &Legendre<M>) -> [f64; 2] {
+        [0, 1].map(|a| self.start[a] + self.half * legendre.integral(&self.velocity[a]))
     }
 }
 

@@ -84,12 +84,48 @@ impl<const M: usize> Nodes<M> {
         sum
     }
 
-    /// Returns the polynomial through the values `f` and its integral from −1, at `s`.
-    pub(super) fn value_and_integral(&self, f: &[f64; M], s: f64) -> [f64; 2] {
-        (0..M).fold([0.0; 2], |[value, sum], n| {
-            let c = self.coefficient(n, f);
-            [value + c * legendre(n, s)[0], sum + c * integral(n, s)]
-        })
+    /// Returns the Legendre coefficients of `f`.
+    #[inline]
+    pub(super) fn coefficients(&self, f: &[f64; M]) -> [f64; M] {
+        std::array::from_fn(|n| self.coefficient(n, f))
+    }
+}
+
+/// The Legendre polynomials of degrees below `M` at one place, and their integrals from −1.
+pub(super) struct Legendre<const M: usize> {
+    value: [f64; M],
+    integral: [f64; M],
+}
+
+impl<const M: usize> Legendre<M> {
+    #[inline]
+    pub(super) fn at(s: f64) -> Self {
+        let (mut value, mut integral) = ([1.0; M], [s + 1.0; M]);
+        let mut before = 0.0;
+        for n in 0..M {
+            let k = n as f64;
+            let after = ((2.0 * k + 1.0) * s * value[n] - k * before) / (k + 1.0);
+            if n > 0 {
+                integral[n] = (after - before) / (2.0 * k + 1.0);
+            }
+            before = value[n];
+            if n + 1 < M {
+                value[n + 1] = after;
+            }
+        }
+        Self { value, integral }
+    }
+
+    /// Returns the value of the polynomial with these coefficients.
+    #[inline]
+    pub(super) fn value(&self, coefficients: &[f64; M]) -> f64 {
+        (0..M).map(|n| self.value[n] * coefficients[n]).sum()
+    }
+
+    /// Returns the integral from −1 of the polynomial with these coefficients.
+    #[inline]
+    pub(super) fn integral(&self, coefficients: &[f64; M]) -> f64 {
+        (0..M).map(|n| self.integral[n] * coefficients[n]).sum()
     }
 }
 
@@ -150,7 +186,8 @@ mod tests {
                 assert!((up_to[i] - half * (f[i] - start)).abs() < within, "{M} nodes, {i}");
             }
             assert!((nodes.whole(&f, half) - half * (1_f64.exp() - start)).abs() < within);
-            let [value, integral] = nodes.value_and_integral(&f, 0.3);
+            let (legendre, series) = (Legendre::at(0.3), nodes.coefficients(&f));
+            let [value, integral] = [legendre.value(&series), legendre.integral(&series)];
             assert!((value - 0.3_f64.exp()).abs() < 10.0 * within);
             assert!((integral - (0.3_f64.exp() - start)).abs() < 10.0 * within);
         }

@@ -24,10 +24,10 @@ use crate::scene::Scene;
 use crate::scene::configuration::{Configuration, Method, Model, Pace};
 use crate::scene::drive::Drive;
 use crate::scene::driven_models::DrivenSliding;
-use crate::scene::rolling_check::SURE_TO_ROLL;
 use crate::scene::run::{RunOutcome, SceneRunner};
 use crate::scene::samples::Samples;
 use crate::scene::stepping::{Failure, MOST_STEPS, NoObserver, StepObserver};
+use crate::scene::survey::SURE_TO_ROLL;
 use offbd_core::maths::System;
 use offbd_core::plant::{Body, GRAVITY_M_S2, Hold, Motion, Phase, PlateMotion};
 

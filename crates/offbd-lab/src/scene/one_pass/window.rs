@@ -24,7 +24,7 @@ use std::f64::consts::SQRT_2;
 
 use super::nodes::Nodes;
 use crate::scene::drive::PlateNodes;
-use crate::scene::rolling_check::SURE_TO_ROLL;
+use crate::scene::survey::SURE_TO_ROLL;
 use offbd_core::plant::{Ball, Contact, Plate};
 
 /// A model of a ball on the plate, from the cheapest to the most accurate.
