@@ -50,6 +50,7 @@ impl Link {
     /// Waits again from `now` on, because the clock has jumped or the process has slept.
     pub(super) fn wait_from(&mut self, now: Micros) {
         self.seen_at = self.seen_at.max(now);
+        self.arriving_since = None;
     }
 
     /// Takes note of the last arrival, if there was one, and returns the change at `now`.
@@ -60,7 +61,6 @@ impl Link {
         settings: &CommunicationSettings,
     ) -> Option<LinkChange> {
         let arrival = arrival.filter(|&arrival| arrival > self.seen_at);
-        let gap = arrival.map(|arrival| arrival - self.seen_at);
         self.seen_at = arrival.unwrap_or(self.seen_at);
         let lost_after = micros(Duration::from_secs(settings.lost_after_s));
         let is_silent = now - self.seen_at >= lost_after;
@@ -68,23 +68,19 @@ impl Link {
             self.is_lost = is_silent;
             return is_silent.then_some(LinkChange::Lost);
         }
+        // Judged at the arrival, not at `now`: a look that comes late still sees data that came
+        // back for a moment. What was there between the arrivals that two looks see is not known.
+        if let Some(arrival) = arrival {
+            let run = arrival - *self.arriving_since.get_or_insert(arrival);
+            if run >= micros(Duration::from_secs(settings.back_after_s)) {
+                (self.is_lost, self.arriving_since) = (false, None);
+                return Some(LinkChange::Back);
+            }
+        }
         if is_silent {
             self.arriving_since = None;
-            return None;
         }
-        match (self.arriving_since, arrival) {
-            (None, Some(arrival)) => self.arriving_since = Some(arrival),
-            (Some(_), Some(arrival)) if gap >= Some(lost_after) => {
-                self.arriving_since = Some(arrival);
-            }
-            _ => {}
-        }
-        let run = self.seen_at - self.arriving_since?;
-        if run < micros(Duration::from_secs(settings.back_after_s)) {
-            return None;
-        }
-        (self.is_lost, self.arriving_since) = (false, None);
-        Some(LinkChange::Back)
+        None
     }
 }
 
@@ -141,6 +137,40 @@ mod tests {
             assert_eq!(link.advance(s * SECOND, Some(s * SECOND), &settings), None, "{s}");
         }
         let back = link.advance(110 * SECOND, Some(110 * SECOND), &settings);
+        assert_eq!(back, Some(LinkChange::Back));
+    }
+
+    /// A busy service looks rarely: the data are older than a silence when it sees them.
+    #[test]
+    fn data_that_a_late_look_finds_are_back_and_then_lost() {
+        let settings = CommunicationSettings { lost_after_s: 1, back_after_s: 0 };
+        let mut link = Link::new(0, true);
+        let back = link.advance(10 * SECOND, Some(5 * SECOND), &settings);
+        assert_eq!(back, Some(LinkChange::Back));
+        let lost = link.advance(11 * SECOND, Some(5 * SECOND), &settings);
+        assert_eq!(lost, Some(LinkChange::Lost));
+    }
+
+    /// Every two arrivals that looks see are farther apart than a silence.
+    #[test]
+    fn data_that_rare_looks_find_again_and_again_are_back() {
+        let settings = CommunicationSettings { lost_after_s: 3, back_after_s: 10 };
+        let mut link = Link::new(0, true);
+        let found: Vec<_> = (1..6)
+            .filter_map(|look| link.advance(5 * look * SECOND, Some(5 * look * SECOND), &settings))
+            .collect();
+        assert_eq!(found, [LinkChange::Back]);
+    }
+
+    /// The hour in which the process slept does not count as time with data.
+    #[test]
+    fn a_jump_of_the_clock_is_not_a_time_with_data() {
+        let settings = CommunicationSettings::default();
+        let mut link = Link::new(0, true);
+        assert_eq!(link.advance(SECOND, Some(SECOND), &settings), None);
+        link.wait_from(3600 * SECOND);
+        assert_eq!(link.advance(3601 * SECOND, Some(3601 * SECOND), &settings), None);
+        let back = link.advance(3611 * SECOND, Some(3611 * SECOND), &settings);
         assert_eq!(back, Some(LinkChange::Back));
     }
 

@@ -22,8 +22,7 @@ use offbd_wire::alarm::CommunicationView;
 use offbd_wire::words::{AlarmChangeWord, AlarmCodeWord};
 
 /// Shortest and longest pause between two looks. The shortest is half of the shortest silence
-/// that can be configured, so that data which come back for a moment are seen; the longest is
-/// half of [`JUMP`].
+/// that can be configured; the longest is half of [`JUMP`].
 const SHORTEST_PAUSE: Duration = Duration::from_millis(500);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
@@ -110,6 +109,8 @@ impl CommunicationWatch {
             // Found again by the next look.
             self.links.clear();
         }
+        // A long look is not a jump of the clock.
+        self.last_look = Some(self.handles.clock.now());
         stored
     }
 
@@ -134,7 +135,6 @@ impl CommunicationWatch {
         if !(0..micros(JUMP)).contains(&elapsed) {
             self.links.values_mut().for_each(|link| link.wait_from(now));
         }
-        self.last_look = Some(now);
     }
 }
 
