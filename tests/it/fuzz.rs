@@ -62,7 +62,7 @@ fn no_parser_panics_on_mutated_inputs() {
     };
     std::thread::scope(|threads| {
         for (name, parse) in PARSERS {
-            threads.spawn(move || run(name, parse));
+            threads.spawn(move || run(name, *parse));
         }
     });
 }

@@ -196,9 +196,26 @@ impl Instance {
     /// Returns the instance that [`to_bytes`](Self::to_bytes) has saved.
     ///
     /// # Errors
-    /// [`Refusal`] if the bytes are those of something else.
+    /// [`Refusal`] if the bytes are those of something else, or have a value that cannot be set.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
-        rmp_serde::from_slice(bytes).map_err(|error| Refusal::State(error.to_string()))
+        let saved: Self =
+            rmp_serde::from_slice(bytes).map_err(|error| Refusal::State(error.to_string()))?;
+        for (i, variable) in VARIABLES.iter().enumerate() {
+            in_range(variable.name, saved.start[i], variable.range.clone())?;
+            // What the model computes may leave the range of start values.
+            if !matches!(variable.role, Role::State | Role::Output) {
+                in_range(variable.name, saved.values[i], variable.range.clone())?;
+            }
+        }
+        // The next step goes on from the time of the twin.
+        let at_s = saved.values[TIME];
+        let is_there = |twin: &SimulatedTwin| {
+            (twin.now().seconds() - at_s).abs() <= LONGEST_COMMUNICATION_STEP_S
+        };
+        if saved.twin.as_ref().is_some_and(|twin| !is_there(twin)) {
+            return Err(Refusal::State("the twin is at another time".to_owned()));
+        }
+        Ok(saved)
     }
 
     fn expect(&self, call: &'static str, phase: LifePhase) -> Result<(), Refusal> {

@@ -156,6 +156,24 @@ fn a_saved_state_goes_on_alike_to_the_bit() {
     assert!(Instance::from_bytes(b"no instance").is_err());
 }
 
+/// A step from such a state would not end.
+#[test]
+fn a_saved_state_with_values_that_cannot_be_set_is_refused() {
+    let mut started = instance(&[]);
+    started.step(0.0, 0.01).unwrap();
+    let refused = |change: &dyn Fn(&mut Instance)| {
+        let mut changed = started.clone();
+        change(&mut changed);
+        Instance::from_bytes(&changed.to_bytes().unwrap()).unwrap_err().to_string()
+    };
+    let step = refused(&|instance| instance.values[LONGEST_STEP] = 1e-12);
+    assert!(step.starts_with("longest_step: "), "{step}");
+    let time = refused(&|instance| instance.values[TIME] = 1e9);
+    assert_eq!(time, "the state was not saved by this model: the twin is at another time");
+    started.values[TIME] = f64::NAN;
+    assert!(Instance::from_bytes(&started.to_bytes().unwrap()).is_err());
+}
+
 #[test]
 fn what_does_not_fit_is_refused_in_words() {
     let mut instance = instance(&[]);

@@ -62,7 +62,12 @@ fn accelerations(position: &[(f64, f64)]) -> Vec<(f64, f64)> {
             found.push((center, acceleration));
         }
         let next = position.get(first).map_or(end, |(t, _)| *t);
-        center = (center + HALF_S).max(next);
+        let next_center = (center + HALF_S).max(next);
+        // Times so large that they do not differ by half a window.
+        if next_center <= center {
+            break;
+        }
+        center = next_center;
     }
     found
 }
@@ -127,6 +132,14 @@ fn regression(pairs: &[(f64, f64)]) -> Option<Following> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_too_large_to_differ_have_no_acceleration() {
+        let position: Vec<_> =
+            (0..20).map(|i| (1e17 + f64::from(i) * 100.0, f64::from(i))).collect();
+        assert_eq!(accelerations(&position), []);
+        assert_eq!(accelerations(&[(0.0, 1.0), (0.1, 1.0), (1e300, 1.0)]), []);
+    }
 
     /// A frictionless ball on a plate that tilts by a sine: x = −7 q₀/ω² sin ωt by twice
     /// integrating the equation of motion.

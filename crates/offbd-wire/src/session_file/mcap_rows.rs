@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read, Seek};
 
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{McapError, parse_record};
 
@@ -85,6 +85,16 @@ impl<S: Read> Messages<S> {
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     self.budget.spend(RECORD_HEAD_BYTES + data.len() as u64)?;
+                    if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+                        continue;
+                    }
+                    if opcode != op::MESSAGE && !has_whole_texts(opcode, data) {
+                        let reason = "a text is longer than its record".to_owned();
+                        return Err(SessionFileError::Damaged {
+                            format: SessionFormat::Mcap,
+                            reason,
+                        });
+                    }
                     let record = parse_record(opcode, data).map_err(|error| damaged(&error))?;
                     let message = note(&mut self.schemas, &mut self.channels, record);
                     if message.is_some() {
@@ -95,6 +105,40 @@ impl<S: Read> Messages<S> {
         }
         Ok(None)
     }
+}
+
+/// Whether the texts of a schema or a channel are within its record. The library reserves as much
+/// memory as a text states, up to 4 GiB, before it reads the text.
+fn has_whole_texts(opcode: u8, record: &[u8]) -> bool {
+    let n_ids = if opcode == op::CHANNEL { 2 } else { 1 };
+    let Some(mut rest) = record.get(2 * n_ids..) else { return false };
+    if !(skip_text(&mut rest) && skip_text(&mut rest)) {
+        return false;
+    }
+    if opcode != op::CHANNEL {
+        return true;
+    }
+    // Pairs of texts, after the number of their bytes.
+    let Some(mut pairs) = after_length(&mut rest) else { return false };
+    while !pairs.is_empty() {
+        if !(skip_text(&mut pairs) && skip_text(&mut pairs)) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Takes a length and as many bytes from `rest`; `None` if it has fewer.
+fn after_length<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let (length, bytes) = rest.split_first_chunk()?;
+    let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
+    let (taken, left) = bytes.split_at_checked(length)?;
+    *rest = left;
+    Some(taken)
+}
+
+fn skip_text(rest: &mut &[u8]) -> bool {
+    after_length(rest).is_some()
 }
 
 /// Notes which channels have JSON; returns a message of one of these.

@@ -22,6 +22,9 @@ const SECONDS_PER_DAY: f64 = 86_400.0;
 /// Most rows of a sheet: all that a spreadsheet has. A sheet with more is refused.
 const MAX_ROWS: u32 = 1 << 20;
 
+/// Most columns of a sheet: all that a spreadsheet has. A sheet with more is refused.
+const MAX_COLUMNS: u32 = 1 << 14;
+
 /// Longest text of a sheet, bytes. Chosen: a million rows of six numbers with all their digits.
 const MAX_SHEET_BYTES: usize = 128 << 20;
 
@@ -114,6 +117,9 @@ impl Lines<'_> {
     fn cell(&mut self, (row, column): (u32, u32), value: &str) -> Result<(), SessionFileError> {
         if row >= MAX_ROWS {
             return Err(wrong(self.sheet, format!("it has more than {MAX_ROWS} rows")));
+        }
+        if column >= MAX_COLUMNS {
+            return Err(wrong(self.sheet, format!("it has more than {MAX_COLUMNS} columns")));
         }
         while self.row < row {
             self.end_row()?;

@@ -6,8 +6,8 @@
 //!
 //! A mapping is a list of `QUANTITY=EXPRESSION`. An expression is a sum of columns and constants,
 //! each with any number of factors: `*NUMBER`, `/NUMBER` or `/UNIT`, or `NUMBER*` before it. A
-//! column is written by its name, in quotes if the name has blanks or one of `+-*/,='"`, or by its
-//! number: `#1` is the first. The time may be a date, or a date and a time of day:
+//! column is written by its name, in quotes if the name has blanks or one of `+-*/,='"(`, or by
+//! its number: `#1` is the first. The time may be a date, or a date and a time of day:
 //! `t_s=date+clock`. `y_m=none` leaves a quantity out.
 
 use std::fmt;
@@ -51,9 +51,17 @@ impl fmt::Display for ColumnName {
     }
 }
 
-/// Returns the name of a column, if it has one that no other column has.
+/// Longest name of a column that a mapping is proposed with, bytes. Chosen: a mapping has at most
+/// [`MAX_BYTES`]; a longer name is given by its number.
+const LONGEST_NAME: usize = 200;
+
+/// Returns the name of a column, if it has one that no other column has, that can be put in quotes
+/// and is not too long.
 pub(super) fn own_name(names: &[String], column: usize) -> Option<&str> {
-    let name = names.get(column).filter(|name| !name.is_empty())?;
+    let has_both_quotes = |name: &String| name.contains('\'') && name.contains('"');
+    let is_usable =
+        |name: &&String| (1..=LONGEST_NAME).contains(&name.len()) && !has_both_quotes(name);
+    let name = names.get(column).filter(is_usable)?;
     let is_same = |other: &&String| other.eq_ignore_ascii_case(name);
     (names.iter().filter(is_same).count() == 1).then_some(name)
 }
@@ -61,7 +69,7 @@ pub(super) fn own_name(names: &[String], column: usize) -> Option<&str> {
 /// Whether a column's name needs no quotes.
 fn is_plain(name: &str) -> bool {
     let starts_as_number = name.starts_with(|c: char| c.is_ascii_digit() || c == '.' || c == '#');
-    !name.is_empty() && !starts_as_number && !name.contains(ends_name)
+    !name.is_empty() && !starts_as_number && !name.contains(|c| ends_name(c) || c == '(')
 }
 
 fn ends_name(c: char) -> bool {
@@ -401,7 +409,7 @@ impl<'a> Parser<'a> {
         if piece.is_empty() || piece.starts_with(ends_name) {
             return Err(MappingError::new(quantity, "lacks a column"));
         }
-        if piece.contains(['(', ')', '^', '[', ';']) && self.rest.contains('(') {
+        if piece.contains('(') {
             let reason = "is not a name; an expression is a sum of columns with factors, without \
                 functions; put a column's name with such characters in quotes";
             return Err(MappingError::new(piece, reason));
@@ -453,6 +461,16 @@ mod tests {
         assert_eq!((qx, y), (&Some(Expression::default()), &Some(Expression::default())));
         assert_eq!(x.as_ref().unwrap().terms, [column("none", 1e-3)]);
         assert_eq!(mapping.to_string(), "cmd_qx_rad=none, x_m=none/mm, y_m=none");
+    }
+
+    #[test]
+    fn a_name_with_a_bracket_is_written_in_quotes() {
+        let mapping = parse("x_m='x (m)'/mm+#2*2+y[0]*2").unwrap();
+        assert_eq!(parse(&mapping.to_string()), Ok(mapping.clone()));
+        let names = ["y(m".to_owned(), "both ' and \"".to_owned(), "x".repeat(201)];
+        assert_eq!([own_name(&names, 1), own_name(&names, 2)], [None, None]);
+        let named = parse("x_m=#1/mm, y_m=#2/mm").unwrap().with_names(&names).to_string();
+        assert_eq!(named, "x_m='y(m'/mm, y_m=#2/mm");
     }
 
     #[test]
