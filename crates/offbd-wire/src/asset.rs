@@ -949,6 +949,7 @@ mod tests {
                 judged_s: 300.0,
                 nearest: 0.25 * i as f64,
                 alarms_per_hour: (i > 0).then_some(0.01),
+                most_alarms_per_hour: (i > 1).then_some(0.03),
             })),
             left_out: vec![LeftOut {
                 session: 2,

@@ -20,10 +20,15 @@ pub struct MonitorCertificateView {
     /// Closest approach to an alarm, in [0, 1]: 1 would confirm a fault.
     #[schema(minimum = 0, maximum = 1)]
     pub nearest: f64,
-    /// Expected false alarms per hour of operation, in [0, 1e6]; null if the monitor could
-    /// not judge.
+    /// Expected false alarms per hour of operation, in [0, 1e6]: the mean over rigs like this
+    /// one; null if the monitor could not judge.
     #[schema(minimum = 0, maximum = 1e6)]
     pub alarms_per_hour: Option<f64>,
+    /// False alarms per hour that nine of ten such rigs stay below, in [0, 1e6]; null if
+    /// unknown, as in calibrations of earlier versions.
+    #[serde(default)]
+    #[schema(minimum = 0, maximum = 1e6)]
+    pub most_alarms_per_hour: Option<f64>,
 }
 
 type Certificate = [MonitorCertificate; FaultCode::COUNT];
@@ -35,6 +40,7 @@ pub(super) fn view(certificate: &Certificate) -> Vec<MonitorCertificateView> {
         judged_s: monitor.judged_s,
         nearest: monitor.nearest,
         alarms_per_hour: monitor.alarms_per_hour,
+        most_alarms_per_hour: monitor.most_alarms_per_hour,
     };
     FaultCode::ALL.iter().zip(certificate).map(view).collect()
 }
@@ -50,11 +56,14 @@ pub(super) fn certificate(
     let mut certificate = Certificate::default();
     for (i, view) in views.iter().enumerate() {
         let at = |field: &str| format!("/calibration/certificate/{i}/{field}");
-        let rate = |rate: f64| in_range(&at("alarms_per_hour"), rate, 0.0..=1e6);
+        let rate = |field: &str, rate: Option<f64>| {
+            rate.map(|rate| in_range(&at(field), rate, 0.0..=1e6)).transpose()
+        };
         certificate[FaultCode::from(view.code) as usize] = MonitorCertificate {
             judged_s: in_range(&at("judged_s"), view.judged_s, 0.0..=1e9)?,
             nearest: in_range(&at("nearest"), view.nearest, 0.0..=1.0)?,
-            alarms_per_hour: view.alarms_per_hour.map(rate).transpose()?,
+            alarms_per_hour: rate("alarms_per_hour", view.alarms_per_hour)?,
+            most_alarms_per_hour: rate("most_alarms_per_hour", view.most_alarms_per_hour)?,
         };
     }
     Ok((!views.is_empty()).then_some(certificate))

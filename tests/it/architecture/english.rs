@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::ROOT;
 
 /// What is read, relative to the root. Migrations are left out: their checksums are stored.
-const READ: [&str; 17] = [
+const READ: [&str; 18] = [
     "ARCHITECTURE.md",
     "CHANGELOG.md",
     "CODE_OF_CONDUCT.md",
@@ -20,6 +20,7 @@ const READ: [&str; 17] = [
     "deploy",
     "docs",
     "examples",
+    "fuzz",
     "scripts",
     "src",
     "tests",

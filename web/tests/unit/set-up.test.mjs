@@ -141,11 +141,11 @@ test("a failed calibration is not activated", async () => {
 
 test("rates of false alarms are in the most readable unit", () => {
   assert.equal(falseAlarmRate(null), "unknown");
-  assert.equal(falseAlarmRate(2), "2.0 per hour");
-  assert.equal(falseAlarmRate(0.5), "12.0 per day");
-  assert.equal(falseAlarmRate(0.9 / 24), "0.9 per day", "not one in 1 days");
-  assert.equal(falseAlarmRate(0.5 / 24), "one in 2 days");
-  assert.equal(falseAlarmRate(1 / 24 / 10), "one in 10 days");
+  assert.equal(falseAlarmRate(2), "fewer than 2.0 per hour");
+  assert.equal(falseAlarmRate(0.5), "fewer than 12.0 per day");
+  assert.equal(falseAlarmRate(0.9 / 24), "fewer than 0.9 per day", "not one in 1 days");
+  assert.equal(falseAlarmRate(0.5 / 24), "fewer than one in 2 days");
+  assert.equal(falseAlarmRate(1 / 24 / 10), "fewer than one in 10 days");
 });
 
 test("snippets have the address of the rig, with a placeholder for localhost on other machines", () => {

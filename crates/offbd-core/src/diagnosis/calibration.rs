@@ -142,9 +142,11 @@ pub struct MonitorCertificate {
     pub judged_s: f64,
     /// Closest approach to an alarm, as a fraction of what confirms a fault, 0 to 1.
     pub nearest: f64,
-    /// Expected false alarms per hour of operation; `None` if the monitor could not
-    /// judge.
+    /// Expected false alarms per hour of operation: the mean over rigs like this one; `None` if
+    /// the monitor could not judge.
     pub alarms_per_hour: Option<f64>,
+    /// False alarms per hour that nine of ten such rigs stay below; `None` if unknown.
+    pub most_alarms_per_hour: Option<f64>,
 }
 
 /// What a calibration comes from, as its maker states it. Not interpreted here: it is

@@ -63,12 +63,12 @@ use crate::vocabulary::{FaultCode, PerAxis, Sample};
 /// Version of the judgement: raised with every change that gives another verdict on some
 /// recording by the same settings, so that verdicts of different versions can be told
 /// apart.
-pub const JUDGEMENT: u32 = 9;
+pub const JUDGEMENT: u32 = 10;
 
 /// Version of the serialised form of an [`Engine`], a [`Plausibility`] and a
 /// [`UsableMotion`], and of what a caller stores with them: raised with every change of the
 /// fields or of what these mean.
-pub const SNAPSHOT_FORMAT: u32 = 12;
+pub const SNAPSHOT_FORMAT: u32 = 13;
 
 /// The pipeline of one rig for one session (one operation cycle).
 ///

@@ -43,7 +43,7 @@ pub(super) fn prove(
     let mut widening = Widening::default();
     let mut tests: Vec<SelfTest> = Vec::new();
     let mut contradicted = false;
-    for _ in 0..MOST_WIDENINGS {
+    for round in 0..MOST_WIDENINGS {
         check(go_on)?;
         tests = folds.iter().flat_map(|fold| fold.tests(rig, &widening)).collect();
         if leave_out_jumps(data, &mut folds, &tests)? {
@@ -55,7 +55,8 @@ pub(super) fn prove(
         }
         let asked = tests.iter().filter(|test| widening.widen(test)).count();
         if asked == 0 {
-            return Ok(Some(with_most(widening.of(&learnt), &tests)));
+            let quiet = round == 0 && data.left_out.is_empty();
+            return Ok(Some(with_most(widening.of(&learnt), &tests, quiet)));
         }
         if widening.is_beyond(&learnt) {
             // No friction holds a ball so firmly.
@@ -115,8 +116,9 @@ fn leave_out(
     Ok(any)
 }
 
-/// Returns `learnt` with the largest values seen in the tests, and its certificate.
-fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
+/// Returns `learnt` with the largest values seen in the tests, and its certificate. `quiet` says
+/// whether the tests gave no alarm from the first on.
+fn with_most(mut learnt: Calibration, tests: &[SelfTest], quiet: bool) -> Calibration {
     for axis in Axis::ALL {
         let most_nats = tests.iter().map(|t| t.most_nats[axis].0).fold(0.0, f64::max);
         let most_path_nats = tests.iter().map(|t| t.most_path_nats[axis]).reduce(f64::max);
@@ -128,7 +130,7 @@ fn with_most(mut learnt: Calibration, tests: &[SelfTest]) -> Calibration {
     let sensor = &mut learnt.sensor;
     sensor.most_outliers = sensor.most_outliers.max(most(|t| t.most_outliers));
     sensor.most_scatter_m = sensor.most_scatter_m.max(scatter_m);
-    learnt.certificate = Some(certificate::of(&learnt, tests));
+    learnt.certificate = Some(certificate::of(&learnt, tests, quiet));
     learnt
 }
 

@@ -44,6 +44,8 @@ pub(super) struct RigResult {
 pub(super) struct FalseAlarms {
     pub(super) code: &'static str,
     pub(super) promised_per_h: f64,
+    /// Rate that nine of ten rigs are promised to stay below.
+    pub(super) most_per_h: f64,
     pub(super) came: u32,
     pub(super) watched_h: f64,
 }
@@ -129,8 +131,9 @@ fn watch(
     let Some(certificate) = &calibration.certificate else { return Ok(Vec::new()) };
     let alarms = |(i, code): (usize, &FaultCode)| {
         let promised_per_h = certificate[i].alarms_per_hour?;
-        let watched_h = plan.healthy_h as f64;
-        Some(FalseAlarms { code: code.as_str(), promised_per_h, came: came[i], watched_h })
+        let most_per_h = certificate[i].most_alarms_per_hour?;
+        let (came, watched_h) = (came[i], plan.healthy_h as f64);
+        Some(FalseAlarms { code: code.as_str(), promised_per_h, most_per_h, came, watched_h })
     };
     Ok(FaultCode::ALL.iter().enumerate().filter_map(alarms).collect())
 }

@@ -125,13 +125,22 @@ fn conclusion(measured: &[RigResult]) -> String {
     let learnt = measured.iter().filter(|m| m.refused.is_none()).count();
     let hours: f64 = measured.iter().filter_map(|m| m.monitors.first()).map(|a| a.watched_h).sum();
     let (kept, n) = kept(delays(measured));
+    let (quiet, monitors) = quiet(&alarms(measured));
     format!(
         "{learnt} of {} drawn rigs learnt; {:.1} false alarms promised in {hours:.0} h, {} came; \
+         {quiet} of {monitors} monitors below the limit stated for 90 %; \
          {kept} of {n} delays within a factor of 2",
         measured.len(),
         all.promised,
         all.came,
     )
+}
+
+/// Counts the monitors that stayed below the rate that nine of ten are promised to stay below, and
+/// all monitors.
+fn quiet(alarms: &[&FalseAlarms]) -> (usize, usize) {
+    let below = |a: &&&FalseAlarms| f64::from(a.came) <= a.most_per_h * a.watched_h;
+    (alarms.iter().filter(below).count(), alarms.len())
 }
 
 /// Counts the delays within a factor of two of the prediction, and all predicted ones. A
@@ -157,6 +166,10 @@ pub(super) fn table(measured: &[RigResult]) -> ChartTable {
         rows.push(row(&format!("{code}, false alarms"), &MonitorGroup::of(&of)));
     }
     rows.push(row("all false alarms", &MonitorGroup::of(&alarms(measured))));
+    let (quiet, n) = quiet(&alarms(measured));
+    let share = format!("{:.0}", 100.0 * quiet as f64 / n.max(1) as f64);
+    let name = "monitors below their limit".to_owned();
+    rows.push(vec![name, "90".to_owned(), share, format!("% of {n}"), "-".to_owned()]);
     for fault in faults(measured) {
         let of = || delays(measured).filter(|d| d.fault == fault);
         let middle = |value: fn(&DetectionDelay) -> Option<f64>| {
