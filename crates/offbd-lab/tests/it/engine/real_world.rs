@@ -269,7 +269,8 @@ fn a_breakaway_that_was_not_observed_is_not_zero() {
 }
 
 /// On a rig with a poorly fitting twin, neither accelerations nor likelihoods of a known
-/// scale are conclusive, but the path is, if its evidence in healthy sessions is known.
+/// scale are conclusive, but with the path they are, if its evidence in healthy sessions is
+/// known.
 #[test]
 fn on_a_rig_that_is_fitted_badly_the_path_accuses_the_servo() {
     let mut learnt = learnt_from(
@@ -279,13 +280,15 @@ fn on_a_rig_that_is_fitted_badly_the_path_accuses_the_servo() {
     let calibration = learnt.rig.calibration.as_mut().unwrap();
     let axis = calibration.axes.x.as_mut().unwrap();
     assert!(axis.most_path_nats.is_some_and(|nats| nats < 10.0), "{axis:?}");
-    (axis.model_error_m_s2, axis.residual_m_s2) = (0.2, 1.0);
-    let fault = "x_servo:gain=0.3@20";
-    let judged = |setup: &Setup| {
-        confirmed(&transitions(setup, &session(Preset::Chapter, Reference::Circle, 60.0, 6, fault)))
-    };
-    assert_eq!(judged(&learnt).first().map(|f| f.0), Some(FaultCode::XServo));
-    let axes = &mut learnt.rig.calibration.as_mut().unwrap().axes;
+    (axis.model_error_m_s2, axis.residual_m_s2) = (0.1, 1.0);
+    let mut without = learnt.clone();
+    let axes = &mut without.rig.calibration.as_mut().unwrap().axes;
     axes.x.as_mut().unwrap().most_path_nats = None;
-    assert!(judged(&learnt).iter().all(|f| f.0 != FaultCode::XServo));
+    for seed in 6..10 {
+        let fault = "x_servo:gain=0.3@20";
+        let samples = session(Preset::Chapter, Reference::Circle, 60.0, seed, fault);
+        let judged = |setup: &Setup| confirmed(&transitions(setup, &samples));
+        assert_eq!(judged(&learnt).first().map(|f| f.0), Some(FaultCode::XServo), "{seed}");
+        assert!(judged(&without).iter().all(|f| f.0 != FaultCode::XServo), "{seed}");
+    }
 }
