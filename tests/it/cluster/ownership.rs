@@ -1,11 +1,13 @@
 //! Partitions and names of nodes, as the database keeps them.
 
+use std::collections::BTreeSet;
+
 use offbd::store::{
     AssetRow, ChangeSet, Location, NodeIdentity, PartitionId, Partitions, SessionProgress,
     SessionRow, Store, StoreError, Write, Writer,
 };
 use offbd_core::vocabulary::Sample;
-use sqlx::Executor;
+use sqlx::{AssertSqlSafe, Executor};
 
 use super::{not_ready, register_rigs};
 use crate::support::cluster::Cluster;
@@ -47,6 +49,10 @@ async fn all_partitions_are_taken_and_released_in_one_transaction() {
 
 /// Records ten samples of a new session, alone in a row of the journal.
 async fn record(writer: &mut Writer, session: String) {
+    try_record(writer, session).await.unwrap();
+}
+
+async fn try_record(writer: &mut Writer, session: String) -> Result<(), StoreError> {
     let asset =
         AssetRow { name: session.clone(), document: "{}".to_owned(), ..AssetRow::default() };
     let partition = Partitions::new(N).of(&asset.name);
@@ -64,7 +70,37 @@ async fn record(writer: &mut Writer, session: String) {
     let append = Write::Append { session, first_index: 0, samples, progress };
     let mut writes = vec![Write::CreateAsset(asset), Write::OpenSession(row), append];
     let set = ChangeSet { partition: Some(partition), writes: &mut writes };
-    writer.commit(&mut [set]).await.unwrap();
+    writer.commit(&mut [set]).await.map(drop)
+}
+
+/// Locks are not replicated: after a fail-over, or behind a pool of connections, two nodes may have
+/// the lock of one partition. The epoch refuses the former owner.
+#[tokio::test]
+async fn a_node_writes_nothing_to_a_partition_that_another_one_has_taken() {
+    let server = Postgres::new();
+    let url = server.database("cluster");
+    let all: Vec<_> = Partitions::new(N).all().collect();
+    let mut a = node(&url, "1", "a").await.unwrap();
+    a.take(&all).await.unwrap();
+    record(&mut a, "rig-0".to_owned()).await;
+    let taken = Partitions::new(N).of("rig-0");
+    let rig = (1..).map(|i| format!("rig-{i}")).find(|rig| Partitions::new(N).of(rig) == taken);
+    let other = (1..).map(|i| format!("rig-{i}")).find(|rig| Partitions::new(N).of(rig) != taken);
+
+    let mut database = connection(&url).await;
+    let take = AssertSqlSafe(format!(
+        "UPDATE partition SET epoch = epoch + 1, owner = '2' WHERE id = {taken}"
+    ));
+    assert_eq!(database.execute(take).await.unwrap().rows_affected(), 1);
+    let refused = try_record(&mut a, rig.unwrap()).await;
+    let lost = |e: &StoreError| matches!(e, StoreError::Overtaken { partitions } if *partitions == [taken]);
+    assert!(refused.as_ref().is_err_and(lost), "{refused:?}");
+    assert!(a.owned().into_iter().all(|(partition, _)| partition != taken));
+    record(&mut a, other.clone().unwrap()).await;
+    let names =
+        sqlx::query_scalar("SELECT name FROM asset").fetch_all(&mut database).await.unwrap();
+    let names: BTreeSet<String> = names.into_iter().collect();
+    assert_eq!(names, BTreeSet::from(["rig-0".to_owned(), other.unwrap()]));
 }
 
 /// One transaction for all that a killed node had in its journal would take so long that it
