@@ -4,8 +4,6 @@
 //! does. What it knows when a fault is confirmed is in part from before the fault. This one begins
 //! with the evidence and hardly forgets.
 
-#[cfg(not(feature = "std"))]
-use crate::no_std::*;
 use serde::{Deserialize, Serialize};
 
 use super::FAULTY;

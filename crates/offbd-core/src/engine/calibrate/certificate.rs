@@ -12,8 +12,6 @@
 
 use super::self_test::{PATIENCE, SelfTest};
 use crate::diagnosis::{Calibration, MonitorCertificate, Settings};
-#[cfg(not(feature = "std"))]
-use crate::no_std::*;
 use crate::vocabulary::FaultCode;
 
 /// Shape of the distribution of the rates over rigs. Chosen from the 95 % intervals on the rigs below:
