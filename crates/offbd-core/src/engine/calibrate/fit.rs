@@ -15,10 +15,10 @@ use crate::vocabulary::Axis;
 /// Fraction of the windows that is kept; the others may hold pushes. Chosen.
 const KEPT: f64 = 0.8;
 /// Unexplained part that is tolerated in a window besides the median, as a fraction of
-/// its own mean square motion. Without it the windows of large motion were dropped where
-/// a ball sticks, and gains of a real rig came out at 0.5 to 0.7 instead of 0.7 to 0.95.
-/// With 0, 0.1 and 0.3, 121, 158 and 176 of 700 faults put into servos of real rigs were
-/// found; with 1 healthy runs were accused.
+/// its own mean square motion: where a ball sticks, the windows of large motion would be
+/// dropped, and the gain would be that of small ones. Chosen. On 200 simulated rigs with the
+/// properties of real ones 0, 0.1, 0.3 and 1 calibrate 146 to 150 rigs, with a median error of
+/// the gain of 2.2 to 2.4 %.
 const MOTION_SHARE: f64 = 0.3;
 
 /// Rounds of fitting and trimming. Chosen.

@@ -241,6 +241,20 @@ fn sessions_that_contradict_each_other_are_refused_or_make_wide() {
     assert!(named, "{error}");
 }
 
+/// The speed of the ball is not known at first. A servo that answers half must not become a healthy
+/// one meanwhile.
+#[test]
+fn a_servo_that_answers_half_from_the_start_is_found() {
+    let sessions = [2, 3, 4].map(|seed| healthy(Preset::Chapter, seed));
+    let setup = learnt_from(&rig(Preset::Chapter), &sessions);
+    for seed in 6..10 {
+        let fault = "x_servo:gain=0.5@0";
+        let samples = session(Preset::Chapter, Reference::Circle, 20.0, seed, fault);
+        let found = confirmed(&transitions(&setup, &samples));
+        assert_eq!(found.first().map(|f| f.0), Some(FaultCode::XServo), "{seed}");
+    }
+}
+
 /// If the ball was never observed at rest, its breakaway tilt is unknown, not zero: it may
 /// rest at one degree.
 #[test]
