@@ -5,6 +5,7 @@ use std::io::Write;
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Version of nats-server that `scripts/nats-server` installs.
 const NATS_VERSION: &str = "2.15.1";
@@ -41,9 +42,22 @@ impl Drop for Watched {
     }
 }
 
-/// Returns a port that nobody listens on.
+/// Ports below those that Linux gives to connections and to listeners that ask for any.
+const ASKED_FOR: std::ops::Range<u32> = 20_000..32_768;
+
+/// Returns a port that nobody listens on, another one each time. Until a server listens on it, the
+/// system gives it to nobody.
 pub fn free_port() -> u16 {
-    TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+    static N_ASKED: AtomicU32 = AtomicU32::new(0);
+    let start = std::process::id().wrapping_mul(101);
+    loop {
+        let n = start.wrapping_add(N_ASKED.fetch_add(1, Ordering::Relaxed));
+        let port = ASKED_FOR.start + n % (ASKED_FOR.end - ASKED_FOR.start);
+        let port = u16::try_from(port).unwrap();
+        if TcpListener::bind(("127.0.0.1", port)).is_ok() {
+            return port;
+        }
+    }
 }
 
 #[expect(clippy::disallowed_methods, reason = "a test must not wait forever")]
