@@ -84,23 +84,25 @@ async fn a_node_writes_nothing_to_a_partition_that_another_one_has_taken() {
     a.take(&all).await.unwrap();
     record(&mut a, "rig-0".to_owned()).await;
     let taken = Partitions::new(N).of("rig-0");
-    let rig = (1..).map(|i| format!("rig-{i}")).find(|rig| Partitions::new(N).of(rig) == taken);
-    let other = (1..).map(|i| format!("rig-{i}")).find(|rig| Partitions::new(N).of(rig) != taken);
+    let rig = |of_taken: bool| {
+        let is_wanted = |rig: &String| (Partitions::new(N).of(rig) == taken) == of_taken;
+        (1..).map(|i| format!("rig-{i}")).find(is_wanted).unwrap()
+    };
 
     let mut database = connection(&url).await;
     let take = AssertSqlSafe(format!(
         "UPDATE partition SET epoch = epoch + 1, owner = '2' WHERE id = {taken}"
     ));
     assert_eq!(database.execute(take).await.unwrap().rows_affected(), 1);
-    let refused = try_record(&mut a, rig.unwrap()).await;
-    let lost = |e: &StoreError| matches!(e, StoreError::Overtaken { partitions } if *partitions == [taken]);
-    assert!(refused.as_ref().is_err_and(lost), "{refused:?}");
+    let refused = try_record(&mut a, rig(true)).await;
+    let Err(StoreError::Overtaken { partitions }) = refused else { panic!("{refused:?}") };
+    assert_eq!(partitions, [taken]);
     assert!(a.owned().into_iter().all(|(partition, _)| partition != taken));
-    record(&mut a, other.clone().unwrap()).await;
+    record(&mut a, rig(false)).await;
     let names =
         sqlx::query_scalar("SELECT name FROM asset").fetch_all(&mut database).await.unwrap();
     let names: BTreeSet<String> = names.into_iter().collect();
-    assert_eq!(names, BTreeSet::from(["rig-0".to_owned(), other.unwrap()]));
+    assert_eq!(names, BTreeSet::from(["rig-0".to_owned(), rig(false)]));
 }
 
 /// One transaction for all that a killed node had in its journal would take so long that it
