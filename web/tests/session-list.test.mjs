@@ -4,11 +4,11 @@ import { test } from "node:test";
 import { imported, recordings } from "./rigs.mjs";
 import { ask, page, started } from "./support.mjs";
 
-let service, chromium;
+let service, chromium, rig;
 
 started(async (made) => {
   ({ service, chromium } = made);
-  const rig = recordings(made.work);
+  rig = recordings(made.work);
   await ask(service.url, "POST", "/assets", { ...rig.learnt, name: "bench" });
   await imported(service.url, "bench", "run-1", rig.healthy);
   await imported(service.url, "bench", "run-2", rig.sick);
@@ -56,6 +56,45 @@ test("sessions are selected by name, verdict and day, ordered, and the address h
   await view.getByRole("link", { name: "Show all sessions" }).click();
   await shows(view, "trial", "run-2", "run-1");
   assert.equal(await view.getByLabel("Session", { exact: true }).inputValue(), "");
+  assert.deepEqual(view.errors, []);
+  await view.done();
+});
+
+test("what is typed stays when the list is fetched again meanwhile", async () => {
+  const view = await page(chromium);
+  await view.goto(`${service.url}/sessions`);
+  await shows(view, "trial", "run-2", "run-1");
+  const fetched = async () => {
+    const response = await view.waitForResponse(/\/api\/v1\/sessions\?/);
+    await response.finished();
+    await view.evaluate(
+      () => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))),
+    );
+  };
+  const name = view.getByLabel("Session", { exact: true });
+  const asset = view.getByLabel("Rig", { exact: true });
+  await name.fill("ru");
+  await asset.pressSequentially("ben");
+  await fetched();
+  await asset.pressSequentially("ch");
+  assert.equal(await asset.inputValue(), "bench");
+  await asset.press("Enter");
+  await view.waitForURL("**/sessions?name=ru&asset=bench");
+  await name.fill("run-1");
+  await fetched();
+  assert.equal(await name.inputValue(), "run-1");
+  await name.press("Enter");
+  await shows(view, "run-1");
+
+  // The dialogue is above the list.
+  const buffer = Buffer.from(rig.healthy);
+  await view.locator("input[type=file]").setInputFiles({ name: "more.csv", mimeType: "text/csv", buffer });
+  await view.getByText("Mapping as a text").click();
+  const mapping = view.getByLabel("Mapping of the columns");
+  const text = `${await mapping.inputValue()}*1.5`;
+  await mapping.fill(text);
+  await fetched();
+  assert.equal(await mapping.inputValue(), text);
   assert.deepEqual(view.errors, []);
   await view.done();
 });

@@ -1,4 +1,5 @@
 import { tagApi } from "../../api/tags";
+import { useDraft } from "../../hooks/use-draft";
 import { useQuery } from "../../hooks/use-query";
 import { Choice } from "../../parts/choice";
 import { Filters } from "../../parts/filters";
@@ -51,17 +52,13 @@ function DayField({
 /** Selects and orders sessions. */
 export function SessionTools({ names, word, change }: Props) {
   const { data: tags } = useQuery(tagApi.inUse, "tags");
+  const name = useDraft(word("name"), (text) => change("name", text.trim()));
   return (
     <Filters n={KEYS.filter(word).length}>
       <RigChoice names={names} chosen={word("asset")} change={(name) => change("asset", name)} />
       <label>
         Session
-        <input
-          type="search"
-          placeholder="begins with"
-          value={word("name")}
-          onChange={(e) => change("name", e.currentTarget.value.trim())}
-        />
+        <input type="search" placeholder="begins with" {...name} />
       </label>
       <Choice<string>
         label="Verdict"
