@@ -24,7 +24,7 @@ export function Learnt({ asset, job }: { asset: Asset; job?: CalibrationJob }) {
       )}
       {job?.state === "done" && (
         <p class="wait wait-good" role="status">
-          <b>Calibrated.</b> Used from the next session on.
+          <b>Calibrated.</b> {job.active && "Used from the next session on."}
         </p>
       )}
       {!calibration && !job && <NothingLearnt asset={asset.name} />}
