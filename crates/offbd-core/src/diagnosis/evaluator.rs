@@ -57,6 +57,13 @@ const NOISE_RATIO: f64 = 3.5;
 /// Weight of a dead servo as the cause of a ball that stands, as long as nothing
 /// distinguishes the two. Chosen, not measured: a dead servo is the rarer cause.
 const SERVO_SHARE: f64 = 0.4;
+/// Weight of both servos as the cause of a ball that stands although both ask it to move, as by
+/// their supply, if the ball has not moved in this session or has got to the rim. Chosen, not
+/// measured: a rig without power is as likely as a ball that is held.
+const SERVOS_SHARE: f64 = 0.5;
+/// Time for which the plate must have taken a ball off the rim that stays there, s. Chosen: it would
+/// have rolled several centimetres.
+const OFF_RIM_S: f64 = 1.0;
 /// Weight of a stuck ball as the cause of identical readings, as long as nothing
 /// distinguishes the two. Chosen, not measured: a stuck ball is the rarer cause.
 const STUCK_SHARE: f64 = 0.3;
@@ -118,7 +125,40 @@ pub struct Finding {
     pub gone: bool,
     pub kind: Option<FaultKind>,
     /// Another cause with the same symptoms.
-    pub rival: Option<Candidate>,
+    pub rival: Option<Rival>,
+}
+
+/// A part of the rig that explains the same symptoms as a monitor's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RivalPart {
+    StuckBall,
+    /// A dead servo.
+    Servo(Axis),
+    /// Both servos, dead by a common cause.
+    BothServos,
+}
+
+/// Another cause with the same symptoms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rival {
+    pub part: RivalPart,
+    /// Its weight beside the monitor's own cause, in (0, 1).
+    pub weight: f64,
+}
+
+impl Rival {
+    /// Returns the causes, whose weights sum to that of the rival.
+    pub fn candidates(self) -> impl Iterator<Item = Candidate> {
+        let dead = Some(FaultKind::Dead);
+        let parts = match self.part {
+            RivalPart::StuckBall => [Some((FaultCode::StuckBall, None)), None],
+            RivalPart::Servo(axis) => [Some((FaultCode::servo(axis), dead)), None],
+            RivalPart::BothServos => Axis::ALL.map(|axis| Some((FaultCode::servo(axis), dead))),
+        };
+        let n = parts.iter().flatten().count() as f64;
+        let weighed = move |(code, kind)| Candidate { code, kind, weight: self.weight / n };
+        parts.into_iter().flatten().map(weighed)
+    }
 }
 
 /// A limit of the readings that is learnt from healthy sessions.
@@ -257,7 +297,9 @@ impl Evaluator {
             Test::Prefailed => Finding::default(),
             _ => self.stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
-        let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
+        // Of a ball that has not moved yet, the monitor of the ball tells what holds it.
+        let blind =
+            !readings.has_moved || [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
             true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
             false => self.believed(axis, evidence, servo(axis, evidence, around)),
@@ -338,7 +380,7 @@ impl Evaluator {
             Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
         if both && !around.at_edge && any(&dead) {
             let moved = any(&|a| self.missed(a, &axes[a]));
-            let stuck = Candidate { code: FaultCode::StuckBall, kind: None, weight: STUCK_SHARE };
+            let stuck = Rival { part: RivalPart::StuckBall, weight: STUCK_SHARE };
             let rival = (!moved).then_some(stuck);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
         }
@@ -377,16 +419,22 @@ impl Evaluator {
         readings: &Stillness,
         around: &Surroundings,
     ) -> Finding {
-        if around.at_edge || readings.unseen_s > 0.0 || !readings.has_positions {
-            return Finding::default();
-        }
         let pressed = |axis: Axis| {
             let still = &readings.axes[axis];
             still.pressed_s >= PRESSED_S && still.asked_widths >= TURNING_WIDTHS
         };
+        if readings.unseen_s > 0.0 || !readings.has_positions {
+            return Finding::default();
+        }
+        if around.at_edge {
+            let stands = readings.still_s() >= PRESSED_S && !around.has_broken_servo;
+            let leaves = readings.free_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
+            return if stands && leaves { stuck_or_servos() } else { Finding::default() };
+        }
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,
-            (true, true) => Finding::fail(None),
+            (true, true) if readings.has_moved => Finding::fail(None),
+            (true, true) => stuck_or_servos(),
             (false, false) => Finding::default(),
             (true, false) => self.stuck_or_servo(Axis::X, evidence),
             (false, true) => self.stuck_or_servo(Axis::Y, evidence),
@@ -402,7 +450,7 @@ impl Evaluator {
             return Finding::default();
         }
         let weight = SERVO_SHARE + (1.0 - SERVO_SHARE) * share;
-        let servo = Candidate { code: FaultCode::servo(axis), kind: Some(FaultKind::Dead), weight };
+        let servo = Rival { part: RivalPart::Servo(axis), weight };
         Finding { rival: Some(servo), ..Finding::fail(None) }
     }
 }
@@ -440,6 +488,12 @@ fn pinned(
         e.residual_m_s2().zip(e.position_m).is_some_and(|(residual, at)| residual * at > 0.0);
     let alive = readings.axes[axis].identical_s < FROZEN_S;
     around.rim == Some(axis) && around.rim_s >= window_s && outward && alive
+}
+
+/// A ball that stands although both servos ask it to move.
+fn stuck_or_servos() -> Finding {
+    let servos = Rival { part: RivalPart::BothServos, weight: SERVOS_SHARE };
+    Finding { rival: Some(servos), ..Finding::fail(None) }
 }
 
 /// The chapter's rule: enabled, and a residual of at least 0.01 m/s².
@@ -510,6 +564,7 @@ mod tests {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
             asked_m_s2: PerAxis { x: 1.0, y: 0.0 },
+            free: true,
             still_m: 1e-3,
             refused: false,
             outliers: 0,
@@ -604,6 +659,7 @@ mod tests {
                 dt: 0.01,
                 position_m: PerAxis { x: Some(0.0), y: Some(y) },
                 asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
+                free: false,
                 still_m: 2e-3,
                 refused: false,
                 outliers: 0,

@@ -29,6 +29,8 @@ pub struct Reading {
     /// Acceleration that the commands demand of the ball along each axis, m/s²; zero
     /// while it is below what may hold the ball.
     pub asked_m_s2: PerAxis<f64>,
+    /// Whether nothing but the ball itself can keep it where it is: no rim does.
+    pub free: bool,
     /// Range within which a ball at rest may seem to move, m.
     pub still_m: f64,
     /// Whether the outlier gate refused the reading; false if there is none.
@@ -70,8 +72,9 @@ fn velocity_gain(since_s: f64) -> f64 {
 }
 
 impl AxisStillness {
-    /// `gain` is that of the velocity after one reading.
-    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) {
+    /// `gain` is that of the velocity after one reading. Returns whether the ball has moved.
+    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) -> bool {
+        let is_first = self.anchor_m.is_none();
         let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
         let moved = strays && (self.strayed || self.anchor_m.is_none());
         self.strayed = strays;
@@ -89,6 +92,7 @@ impl AxisStillness {
             (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
         }
         self.repeat(position_m, reading.dt, gain);
+        moved && !is_first
     }
 
     fn repeat(&mut self, position_m: f64, dt: f64, gain: f64) {
@@ -140,6 +144,10 @@ pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
     /// Whether a ball has been seen in this session.
     pub has_positions: bool,
+    /// Whether it has moved since, or since the readings were last forgotten.
+    pub has_moved: bool,
+    /// Time for which no rim has been able to hold the ball, s.
+    pub free_s: f64,
     /// Time since a ball was last seen, s; before the first one, only the time for which one was
     /// asked to move.
     pub unseen_s: f64,
@@ -173,9 +181,11 @@ impl Stillness {
             return;
         }
         let gain = velocity_gain(reading.dt);
+        self.free_s = if reading.free { self.free_s + reading.dt } else { 0.0 };
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
-                self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading, gain);
+                self.has_moved |=
+                    self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading, gain);
             }
         }
     }
@@ -226,6 +236,7 @@ mod tests {
             dt: 0.01,
             position_m: PerAxis { x, y: None },
             asked_m_s2: PerAxis { x: if pressed { 1.0 } else { 0.0 }, y: 0.0 },
+            free: true,
             still_m: 0.002,
             refused: false,
             outliers: 0,

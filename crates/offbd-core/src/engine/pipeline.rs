@@ -357,13 +357,16 @@ impl Pipeline {
     fn watch_readings(&mut self, moment: &Moment, dt: f64, refused: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
         let asked_m_s2 = PerAxis::from_fn(|a| {
-            let pull_m_s2 = moment.command[a].map_or(0.0, |_| self.pull_m_s2(a));
+            let pull_m_s2 = moment.command[a].map_or(0.0, |_| self.pull_m_s2(a).abs());
             if pull_m_s2 > limits[a].pressing_m_s2() { pull_m_s2 } else { 0.0 }
         });
+        let pull_m_s2 = PerAxis::from_fn(|a| self.pull_m_s2(a));
+        let most_held_m_s2 = limits.x.pressing_m_s2().max(limits.y.pressing_m_s2());
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
             asked_m_s2,
+            free: self.edge.is_free(&pull_m_s2, most_held_m_s2),
             still_m: self.evaluator.still_m(),
             refused,
             // Bounces off the rim look like outliers.
@@ -371,8 +374,7 @@ impl Pipeline {
         });
     }
 
-    /// Returns the least acceleration that the plate demands of the ball along `axis`,
-    /// m/s², given the uncertainty of this session's level.
+    /// Returns the acceleration, m/s², that the plate demands of the ball along `axis` at least, given the uncertainty of this session's level.
     fn pull_m_s2(&self, axis: Axis) -> f64 {
         self.servos[axis].least_pull_m_s2(self.twin.motion().acceleration[axis as usize])
     }
@@ -406,7 +408,7 @@ impl Pipeline {
     /// Whether the ball rests within its breakaway angle.
     fn rests(&self, axis: Axis) -> bool {
         let held_m_s2 = self.evaluator.limits()[axis].pressing_m_s2();
-        self.readings.axes[axis].rests() && self.pull_m_s2(axis) < held_m_s2
+        self.readings.axes[axis].rests() && self.pull_m_s2(axis).abs() < held_m_s2
     }
 
     /// Whether the ball's motion along `axis` can respond to the servo: not while the
@@ -422,7 +424,7 @@ impl Pipeline {
         let window_s = self.acceleration_filter.window_s(self.least_window_s());
         let see = |axis: Axis| {
             let mut e = self.axis_evidence(moment, axis, window_s);
-            let pull_m_s2 = self.pull_m_s2(axis);
+            let pull_m_s2 = self.pull_m_s2(axis).abs();
             e.enabled =
                 self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, around);
             let suspicious = self.monitors[FaultCode::servo(axis) as usize].suspicious();
