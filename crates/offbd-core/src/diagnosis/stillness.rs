@@ -17,6 +17,10 @@ const RESTING_S: f64 = 0.25;
 /// uncertain whether they are alive. Chosen.
 const REPEATED_SHARE: f64 = 0.4;
 
+/// Time for which a hand may still move the ball that it sets down, s. Chosen: as long as no evidence
+/// against a servo is accumulated.
+const HAND_S: f64 = 1.0;
+
 /// Time constant of the count of recent outliers, s. Chosen.
 const OUTLIER_MEMORY_S: f64 = 10.0;
 
@@ -144,7 +148,9 @@ pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
     /// Whether a ball has been seen in this session.
     pub has_positions: bool,
-    /// Whether it has moved since, or since the readings were last forgotten.
+    /// Time since the first reading, or the first one after the readings were forgotten, s.
+    pub read_s: f64,
+    /// Whether the ball has moved since, later than a hand lets it go.
     pub has_moved: bool,
     /// Time for which no rim has been able to hold the ball, s.
     pub free_s: f64,
@@ -181,11 +187,14 @@ impl Stillness {
             return;
         }
         let gain = velocity_gain(reading.dt);
+        self.read_s +=
+            if Axis::ALL.iter().any(|&a| self.axes[a].seen()) { reading.dt } else { 0.0 };
         self.free_s = if reading.free { self.free_s + reading.dt } else { 0.0 };
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
-                self.has_moved |=
-                    self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading, gain);
+                let asked_m_s2 = reading.asked_m_s2[axis];
+                let moved = self.axes[axis].update(position_m, asked_m_s2, reading, gain);
+                self.has_moved |= moved && self.read_s >= HAND_S;
             }
         }
     }
@@ -277,6 +286,22 @@ mod tests {
             most_widths = most_widths.max(watch.axes.x.asked_widths / 2.0);
         }
         assert!((1.0..6.5).contains(&most_widths), "{most_widths}");
+    }
+
+    #[test]
+    fn a_ball_has_moved_if_it_does_after_the_hand() {
+        let mut watch = Stillness::default();
+        let mut take = |n: u32, x: f64| {
+            (0..n).for_each(|_| watch.update(&reading(Some(x), true)));
+            watch.has_moved
+        };
+        assert!(!take(1, 0.05));
+        assert!(!take(90, 0.0), "a hand sets it down");
+        assert!(!take(20, 0.001), "it is noise");
+        assert!(take(2, 0.01));
+        assert!(take(100, 0.01), "it has moved before");
+        watch.restart();
+        assert!(!watch.has_moved);
     }
 
     #[test]
