@@ -58,7 +58,7 @@ const NOISE_RATIO: f64 = 3.5;
 /// distinguishes the two. Chosen, not measured: a dead servo is the rarer cause.
 const SERVO_SHARE: f64 = 0.4;
 /// Weight of both servos as the cause of a ball that stands although both ask it to move, as by
-/// their supply, if the ball has not moved in this session or has got to the rim. Chosen, not
+/// their supply, if the ball has not moved in this session or has got into a corner. Chosen, not
 /// measured: a rig without power is as likely as a ball that is held.
 const SERVOS_SHARE: f64 = 0.5;
 /// Time for which the plate must have taken a ball off the rim that stays there, s. Chosen: it would
@@ -427,9 +427,14 @@ impl Evaluator {
             return Finding::default();
         }
         if around.at_edge {
-            let stands = readings.still_s() >= PRESSED_S && !around.has_broken_servo;
+            // The servo that presses the ball against a rim across one axis is to blame, see `pinned`.
+            let cornered = around.rim.is_none() && !around.has_broken_servo;
             let leaves = readings.free_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
-            return if stands && leaves { stuck_or_servos() } else { Finding::default() };
+            let stands = readings.still_s() >= PRESSED_S;
+            return match cornered && leaves && stands {
+                true => stuck_or_servos(),
+                false => Finding::default(),
+            };
         }
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,

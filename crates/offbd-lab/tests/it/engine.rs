@@ -168,8 +168,8 @@ fn a_confirmed_servo_has_kinds() {
     assert!(n_confirmed >= 9, "{n_confirmed} of 18");
 }
 
-/// A ball that rolls slowly and answers neither servo is not stuck. At the rim, where it stays, the
-/// ball or both servos may be the cause.
+/// A ball that rolls slowly and answers neither servo is not stuck. In a corner, where it stays,
+/// the ball or both servos may be the cause.
 #[test]
 fn a_supply_that_fails_is_not_a_stuck_ball() {
     let mut n_found = 0;
