@@ -86,6 +86,14 @@ test("what is typed stays when the list is fetched again meanwhile", async () =>
   await name.press("Enter");
   await shows(view, "run-1");
 
+  // What is typed and undone does not hide the next value.
+  await view.goto(`${service.url}/sessions?name=other`);
+  await name.fill("others");
+  await name.fill("other");
+  await view.getByRole("link", { name: "Show all sessions" }).click();
+  await shows(view, "trial", "run-2", "run-1");
+  assert.equal(await name.inputValue(), "");
+
   // The dialogue is above the list.
   const buffer = Buffer.from(rig.healthy);
   await view.locator("input[type=file]").setInputFiles({ name: "more.csv", mimeType: "text/csv", buffer });

@@ -58,8 +58,8 @@ const NOISE_RATIO: f64 = 3.5;
 /// distinguishes the two. Chosen, not measured: a dead servo is the rarer cause.
 const SERVO_SHARE: f64 = 0.4;
 /// Weight of both servos as the cause of a ball that stands although both ask it to move, as by
-/// their supply, if the ball has not moved in this session or has got into a corner. Chosen, not
-/// measured: a rig without power is as likely as a ball that is held.
+/// their supply, if the servos have not passed their tests in this session or the ball has got into a
+/// corner. Chosen, not measured: a rig without power is as likely as a ball that is held.
 const SERVOS_SHARE: f64 = 0.5;
 /// Time for which the plate must have taken a ball off the rim that stays there, s. Chosen: it would
 /// have rolled several centimetres.
@@ -109,6 +109,8 @@ pub struct Surroundings {
     pub jumped: bool,
     /// Scatter above which readings count as noisy, m.
     pub noisy_m: f64,
+    /// Whether the tests of both servos have passed in this session, and never failed.
+    pub servos_have_passed: bool,
     /// Whether a fault of a servo that was found in this session goes on.
     pub has_broken_servo: bool,
 }
@@ -297,9 +299,9 @@ impl Evaluator {
             Test::Prefailed => Finding::default(),
             _ => self.stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
-        // Of a ball that has not moved yet, the monitor of the ball tells what holds it.
-        let blind =
-            !readings.has_moved || [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
+        // What holds a ball that has not moved yet, the monitor of the ball tells; at a rim the servo's.
+        let has_never_moved = !readings.has_moved && !around.at_edge;
+        let blind = has_never_moved || [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
             true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
             false => self.believed(axis, evidence, servo(axis, evidence, around)),
@@ -427,9 +429,9 @@ impl Evaluator {
             return Finding::default();
         }
         if around.at_edge {
-            // The servo that presses the ball against a rim across one axis is to blame, see `pinned`.
+            // Of a ball at the rim across one axis, the servo of this axis is blamed: see `pinned`.
             let cornered = around.rim.is_none() && !around.has_broken_servo;
-            let leaves = readings.free_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
+            let leaves = readings.leaving_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
             let stands = readings.still_s() >= PRESSED_S;
             return match cornered && leaves && stands {
                 true => stuck_or_servos(),
@@ -438,7 +440,7 @@ impl Evaluator {
         }
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,
-            (true, true) if readings.has_moved => Finding::fail(None),
+            (true, true) if around.servos_have_passed => Finding::fail(None),
             (true, true) => stuck_or_servos(),
             (false, false) => Finding::default(),
             (true, false) => self.stuck_or_servo(Axis::X, evidence),
@@ -534,6 +536,7 @@ mod tests {
         over_the_edge: false,
         jumped: false,
         noisy_m: 1.0,
+        servos_have_passed: true,
         has_broken_servo: false,
     };
 
@@ -569,7 +572,7 @@ mod tests {
             dt: 0.5,
             position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
             asked_m_s2: PerAxis { x: 1.0, y: 0.0 },
-            free: true,
+            leaves_rim: false,
             still_m: 1e-3,
             refused: false,
             outliers: 0,
@@ -584,6 +587,39 @@ mod tests {
             Evaluator::new(Profile::Default, PerAxis::from_fn(|_| wide), SensorLimits::new(None));
         let evaluator = evaluator.with_suspicion(suspect_nats, PerAxis::from_fn(|_| 1.0));
         evaluator.stuck_ball(&evidence, &readings, &CLEAR)
+    }
+
+    /// A ball that stands although both servos ask it to move is stuck, if they have passed their tests;
+    /// else, and in a corner that the plate takes it out of, it may be the servos.
+    #[test]
+    fn a_ball_that_stands_may_be_due_to_both_servos() {
+        let stands = |leaving_s: f64, around: Surroundings| {
+            let mut readings = Stillness::default();
+            let reading = Reading {
+                dt: 0.5,
+                position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
+                asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
+                leaves_rim: false,
+                still_m: 1e-3,
+                refused: false,
+                outliers: 0,
+            };
+            (0..3).for_each(|_| readings.update(&reading));
+            readings.leaving_s = leaving_s;
+            let wide = PerAxis::from_fn(|_| Limits::new(Profile::Default, None, false, 7.0));
+            let evaluator = Evaluator::new(Profile::Default, wide, SensorLimits::new(None));
+            let found = evaluator.stuck_ball(&Evidence::default(), &readings, &around);
+            (found.test, found.rival.map(|rival| rival.part))
+        };
+        let both = (Test::Prefailed, Some(RivalPart::BothServos));
+        let nothing = (Test::NotTested, None);
+        assert_eq!(stands(0.0, CLEAR), (Test::Prefailed, None));
+        assert_eq!(stands(0.0, Surroundings { servos_have_passed: false, ..CLEAR }), both);
+        let corner = Surroundings { clear_s: 0.0, at_edge: true, ..CLEAR };
+        assert_eq!(stands(1.1, corner), both);
+        assert_eq!(stands(0.9, corner), nothing, "the rims may have held it until now");
+        assert_eq!(stands(1.1, Surroundings { rim: Some(Axis::X), ..corner }), nothing);
+        assert_eq!(stands(1.1, Surroundings { has_broken_servo: true, ..corner }), nothing);
     }
 
     /// A ball that rolls on, or whose servo is known to be broken, is not held back.
@@ -664,7 +700,7 @@ mod tests {
                 dt: 0.01,
                 position_m: PerAxis { x: Some(0.0), y: Some(y) },
                 asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
-                free: false,
+                leaves_rim: false,
                 still_m: 2e-3,
                 refused: false,
                 outliers: 0,

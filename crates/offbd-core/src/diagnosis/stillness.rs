@@ -33,8 +33,8 @@ pub struct Reading {
     /// Acceleration that the commands demand of the ball along each axis, m/s²; zero
     /// while it is below what may hold the ball.
     pub asked_m_s2: PerAxis<f64>,
-    /// Whether nothing but the ball itself can keep it where it is: no rim does.
-    pub free: bool,
+    /// Whether the plate takes the ball off every rim that it is at.
+    pub leaves_rim: bool,
     /// Range within which a ball at rest may seem to move, m.
     pub still_m: f64,
     /// Whether the outlier gate refused the reading; false if there is none.
@@ -148,12 +148,12 @@ pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
     /// Whether a ball has been seen in this session.
     pub has_positions: bool,
-    /// Time since the first reading, or the first one after the readings were forgotten, s.
+    /// Time since the first reading of this session, s.
     pub read_s: f64,
-    /// Whether the ball has moved since, later than a hand lets it go.
+    /// Whether the ball has moved in this session, after the time in which a hand sets it down.
     pub has_moved: bool,
-    /// Time for which no rim has been able to hold the ball, s.
-    pub free_s: f64,
+    /// Time for which the plate has been taking the ball off every rim that it is at, s.
+    pub leaving_s: f64,
     /// Time since a ball was last seen, s; before the first one, only the time for which one was
     /// asked to move.
     pub unseen_s: f64,
@@ -166,7 +166,8 @@ pub struct Stillness {
 impl Stillness {
     /// Forgets the readings.
     pub fn restart(&mut self) {
-        *self = Self { has_positions: self.has_positions, ..Self::default() };
+        let Self { has_positions, read_s, has_moved, .. } = *self;
+        *self = Self { has_positions, read_s, has_moved, ..Self::default() };
     }
 
     /// Takes one sample.
@@ -187,9 +188,8 @@ impl Stillness {
             return;
         }
         let gain = velocity_gain(reading.dt);
-        self.read_s +=
-            if Axis::ALL.iter().any(|&a| self.axes[a].seen()) { reading.dt } else { 0.0 };
-        self.free_s = if reading.free { self.free_s + reading.dt } else { 0.0 };
+        self.read_s += if self.has_positions { reading.dt } else { 0.0 };
+        self.leaving_s = if reading.leaves_rim { self.leaving_s + reading.dt } else { 0.0 };
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
                 let asked_m_s2 = reading.asked_m_s2[axis];
@@ -245,7 +245,7 @@ mod tests {
             dt: 0.01,
             position_m: PerAxis { x, y: None },
             asked_m_s2: PerAxis { x: if pressed { 1.0 } else { 0.0 }, y: 0.0 },
-            free: true,
+            leaves_rim: false,
             still_m: 0.002,
             refused: false,
             outliers: 0,
@@ -301,7 +301,7 @@ mod tests {
         assert!(take(2, 0.01));
         assert!(take(100, 0.01), "it has moved before");
         watch.restart();
-        assert!(!watch.has_moved);
+        assert!(watch.has_moved, "a gap in the readings does not change it");
     }
 
     #[test]

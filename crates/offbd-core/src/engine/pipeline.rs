@@ -366,7 +366,7 @@ impl Pipeline {
             dt,
             position_m: moment.position,
             asked_m_s2,
-            free: self.edge.is_free(&pull_m_s2, most_held_m_s2),
+            leaves_rim: self.edge.is_left(&pull_m_s2, most_held_m_s2),
             still_m: self.evaluator.still_m(),
             refused,
             // Bounces off the rim look like outliers.
@@ -374,7 +374,8 @@ impl Pipeline {
         });
     }
 
-    /// Returns the acceleration, m/s², that the plate demands of the ball along `axis` at least, given the uncertainty of this session's level.
+    /// Returns the acceleration that the plate demands of the ball along `axis`, m/s²: the least that
+    /// the uncertainty of this session's level allows.
     fn pull_m_s2(&self, axis: Axis) -> f64 {
         self.servos[axis].least_pull_m_s2(self.twin.motion().acceleration[axis as usize])
     }
@@ -524,6 +525,10 @@ impl Pipeline {
             over_the_edge: self.edge.at_edge && self.edge.is_open(),
             jumped: self.jumped(),
             noisy_m: self.noisy_m,
+            servos_have_passed: Axis::ALL.iter().all(|&axis| {
+                let status = memory.record(FaultCode::servo(axis)).status;
+                status.completed_this_cycle() && !status.failed_this_cycle()
+            }),
             has_broken_servo: Axis::ALL.iter().any(|&axis| {
                 let code = FaultCode::servo(axis);
                 memory.goes_on(code) && memory.record(code).status.failed_this_cycle()

@@ -188,11 +188,12 @@ fn a_supply_that_fails_is_not_a_stuck_ball() {
                 let samples: Vec<_> = rows.take_while(|s| s.t_s < 60.0).collect();
                 let mut found = transitions(&setup, &samples);
                 found.retain(|t| t.status == FaultStatus::Confirmed);
-                let may_be_servo = |t: &Transition| {
-                    t.code.axis().is_some()
-                        || t.suspicion.candidates.iter().any(|c| c.code.axis().is_some())
+                let names_servos = |t: &Transition| {
+                    let candidates = &t.suspicion.candidates;
+                    let is_named = |a| candidates.iter().any(|c| c.code == FaultCode::servo(a));
+                    t.code.axis().is_some() || Axis::ALL.into_iter().all(is_named)
                 };
-                assert!(found.iter().all(may_be_servo), "{preset} {reference:?}: {found:?}");
+                assert!(found.iter().all(names_servos), "{preset} {reference:?}: {found:?}");
                 n_found += usize::from(!found.is_empty());
             }
         }
@@ -209,7 +210,9 @@ fn a_ball_that_has_not_moved_yet_accuses_no_servo_alone() {
         let mut found = transitions(&setup, &samples);
         found.retain(|t| t.status == FaultStatus::Confirmed);
         assert!(!found.is_empty(), "{seed}");
-        assert!(found.iter().all(|t| t.code == FaultCode::StuckBall), "{seed}: {found:?}");
+        let ball_or_servo =
+            |t: &Transition| t.code == FaultCode::StuckBall && t.suspicion.candidates.len() > 1;
+        assert!(found.iter().all(ball_or_servo), "{seed}: {found:?}");
     }
 }
 

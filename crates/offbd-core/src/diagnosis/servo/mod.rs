@@ -383,8 +383,8 @@ impl ServoFilterBank {
         self.log_likelihood_nats
     }
 
-    /// Returns the least acceleration that the plate demands of the ball, m/s², given the
-    /// twin's acceleration `twin_m_s2` and the uncertainty of the session's level.
+    /// Returns the acceleration that the plate demands of the ball, m/s², of the least size that the
+    /// twin's acceleration `twin_m_s2` and the uncertainty of the session's level allow.
     #[must_use]
     pub fn least_pull_m_s2(&self, twin_m_s2: f64) -> f64 {
         let (offset, variance) = self.healthy.parameter(0);
