@@ -114,18 +114,6 @@ impl Edge {
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
     }
 
-    /// Whether the plate, which accelerates the ball by `pull_m_s2`, takes it off every rim that it is
-    /// at by at least `least_m_s2`; false clear of the edge.
-    pub(super) fn is_left(&self, pull_m_s2: &PerAxis<f64>, least_m_s2: f64) -> bool {
-        let takes_off = |place: &PerAxis<f64>| {
-            let near =
-                self.places(place).map(|at| self.plate.off_edge(&at, self.room_m, pull_m_s2));
-            near.into_iter().flatten().reduce(f64::min).is_some_and(|off| off >= least_m_s2)
-        };
-        let place = self.recent[1].as_ref().map(|(_, place)| place);
-        self.at_edge && self.plate.rim() && place.is_some_and(takes_off)
-    }
-
     /// The places where the ball may be if it is read at `place`.
     fn places(&self, place: &PerAxis<f64>) -> [PerAxis<f64>; 2] {
         [*place, PerAxis::from_fn(|axis| place[axis] - self.displaced_m[axis])]
@@ -193,22 +181,6 @@ mod tests {
         edge.displace(Vector2::new(-0.07, 0.0));
         edge.take(&rest[2], 0.01, false);
         assert!(!edge.at_edge, "it would be beyond the rim: the ball was moved by hand");
-    }
-
-    /// A ball leaves the rim at +x if the plate takes it inward.
-    #[test]
-    fn a_rim_holds_a_ball_that_is_not_taken_off_it() {
-        let rig = Rig::chapter("a");
-        let left = |rig: &Rig, place: f64, pull: f64| {
-            let mut edge = Edge::new(rig);
-            moments(&[place; 3]).iter().for_each(|m| edge.take(m, 0.1, false));
-            edge.is_left(&PerAxis { x: pull, y: 9.0 }, 0.1)
-        };
-        assert!(!left(&rig, 0.05, 0.0), "it is clear of the rim");
-        assert!(left(&rig, 0.18, -0.1) && left(&rig, -0.18, 0.1));
-        assert!(!left(&rig, 0.18, -0.09) && !left(&rig, 0.18, 0.5));
-        let open = Plate::new(rig.plate.shape(), 0.02, false).unwrap();
-        assert!(!left(&Rig { plate: open, ..rig }, 0.19, -1.0));
     }
 
     #[test]
