@@ -17,7 +17,7 @@ export function useDraft(value: string, finish: (text: string) => void) {
       setDraft(undefined);
       finish(e.currentTarget.value);
     },
-    // What was typed and undone is not a change.
+    // If what was typed is undone, the browser reports no change.
     onBlur: () => setDraft(undefined),
   };
 }
