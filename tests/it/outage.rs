@@ -73,11 +73,10 @@ const LOSE_THE_ANSWER: usize = 1;
 const LOSE_THE_COMMIT: usize = 2;
 const FORGET_THE_CONNECTION: usize = 3;
 
-/// Forwards connections from the socket in `from` to that in `to`. As `next_commit` says, it
+/// Forwards connections from `listener` to the socket in `to`. As `next_commit` says, it
 /// drops the next commit or its answer, and closes the connection, or forgets it: the server
 /// is not told.
-async fn proxy(from: PathBuf, to: PathBuf, next_commit: Arc<AtomicUsize>) {
-    let listener = UnixListener::bind(from.join(".s.PGSQL.5432")).unwrap();
+async fn proxy(listener: UnixListener, to: PathBuf, next_commit: Arc<AtomicUsize>) {
     while let Ok((client, _)) = listener.accept().await {
         let server = UnixStream::connect(to.join(".s.PGSQL.5432")).await.unwrap();
         // Lost connections are intended.
@@ -130,10 +129,9 @@ async fn a_commit_with_a_lost_answer_is_neither_lost_nor_repeated() {
     let url = server.database("twin");
     let proxy_directory = tempfile::tempdir().unwrap();
     let next_commit = Arc::new(AtomicUsize::new(PASS));
-    let (from, to) = (proxy_directory.path().to_owned(), server.directory().to_owned());
-    let proxy = tokio::spawn(proxy(from, to, next_commit.clone()));
-    eventually(|| async { proxy_directory.path().join(".s.PGSQL.5432").exists().then_some(()) })
-        .await;
+    // Its file exists before it listens: the service starts only after both.
+    let listener = UnixListener::bind(proxy_directory.path().join(".s.PGSQL.5432")).unwrap();
+    let proxy = tokio::spawn(proxy(listener, server.directory().to_owned(), next_commit.clone()));
     let through = crate::support::postgres::url(proxy_directory.path(), "twin");
     let fixture = ServiceFixture::start_with(|config| {
         config.database = Some(through);

@@ -139,7 +139,9 @@ impl ServiceFixture {
         let data = tempfile::tempdir().unwrap();
         let mut config = config(data.path());
         change(&mut config);
-        let server = server::start(config.clone()).await.unwrap();
+        // With all its causes in one line.
+        let started = server::start(config.clone()).await;
+        let server = started.unwrap_or_else(|error| panic!("{error:#}"));
         let client = Client::new(server.address.to_string());
         Self { server: Some(server), client, data, config }
     }
