@@ -57,6 +57,13 @@ const NOISE_RATIO: f64 = 3.5;
 /// Weight of a dead servo as the cause of a ball that stands, as long as nothing
 /// distinguishes the two. Chosen, not measured: a dead servo is the rarer cause.
 const SERVO_SHARE: f64 = 0.4;
+/// Weight of both servos as the cause of a ball that stands although both ask it to move, as by
+/// their supply, if the servos have not passed their tests in this session or the ball has got into a
+/// corner. Chosen, not measured: a rig without power is as likely as a ball that is held.
+const SERVOS_SHARE: f64 = 0.5;
+/// Time for which the plate must have taken a ball off the rim that stays there, s. Chosen: it would
+/// have rolled several centimetres.
+const OFF_RIM_S: f64 = 1.0;
 /// Weight of a stuck ball as the cause of identical readings, as long as nothing
 /// distinguishes the two. Chosen, not measured: a stuck ball is the rarer cause.
 const STUCK_SHARE: f64 = 0.3;
@@ -96,12 +103,16 @@ pub struct Surroundings {
     pub rim: Option<Axis>,
     /// Time for which the ball has lain there, s.
     pub rim_s: f64,
+    /// Time for which the plate has been taking the ball off every rim that it is at, s.
+    pub off_rim_s: f64,
     /// Whether the ball was last seen at an edge without a rim: it is falling.
     pub over_the_edge: bool,
     /// Whether the readings have recently jumped farther than a ball can move.
     pub jumped: bool,
     /// Scatter above which readings count as noisy, m.
     pub noisy_m: f64,
+    /// Whether the tests of both servos have passed in this session, and never failed.
+    pub servos_have_passed: bool,
     /// Whether a fault of a servo that was found in this session goes on.
     pub has_broken_servo: bool,
 }
@@ -118,7 +129,40 @@ pub struct Finding {
     pub gone: bool,
     pub kind: Option<FaultKind>,
     /// Another cause with the same symptoms.
-    pub rival: Option<Candidate>,
+    pub rival: Option<Rival>,
+}
+
+/// A part of the rig that explains the same symptoms as a monitor's own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RivalPart {
+    StuckBall,
+    /// A dead servo.
+    Servo(Axis),
+    /// Both servos, dead by a common cause.
+    BothServos,
+}
+
+/// Another cause with the same symptoms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rival {
+    pub part: RivalPart,
+    /// Its weight beside the monitor's own cause, in (0, 1).
+    pub weight: f64,
+}
+
+impl Rival {
+    /// Returns the causes, whose weights sum to that of the rival.
+    pub fn candidates(self) -> impl Iterator<Item = Candidate> {
+        let dead = Some(FaultKind::Dead);
+        let parts = match self.part {
+            RivalPart::StuckBall => [Some((FaultCode::StuckBall, None)), None],
+            RivalPart::Servo(axis) => [Some((FaultCode::servo(axis), dead)), None],
+            RivalPart::BothServos => Axis::ALL.map(|axis| Some((FaultCode::servo(axis), dead))),
+        };
+        let n = parts.iter().flatten().count() as f64;
+        let weighed = move |(code, kind)| Candidate { code, kind, weight: self.weight / n };
+        parts.into_iter().flatten().map(weighed)
+    }
 }
 
 /// A limit of the readings that is learnt from healthy sessions.
@@ -257,7 +301,9 @@ impl Evaluator {
             Test::Prefailed => Finding::default(),
             _ => self.stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
-        let blind = [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
+        // What holds a ball that has not moved yet, the monitor of the ball tells; at a rim the servo's.
+        let has_never_moved = !readings.has_moved && !around.at_edge;
+        let blind = has_never_moved || [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
             true => Finding { gone: around.over_the_edge, ..Finding::NOTHING },
             false => self.believed(axis, evidence, servo(axis, evidence, around)),
@@ -338,7 +384,7 @@ impl Evaluator {
             Axis::ALL.into_iter().filter(|&a| seen(a)).all(|a| axes[a].identical_s >= FROZEN_S);
         if both && !around.at_edge && any(&dead) {
             let moved = any(&|a| self.missed(a, &axes[a]));
-            let stuck = Candidate { code: FaultCode::StuckBall, kind: None, weight: STUCK_SHARE };
+            let stuck = Rival { part: RivalPart::StuckBall, weight: STUCK_SHARE };
             let rival = (!moved).then_some(stuck);
             return Some(Finding { rival, ..Finding::fail(Some(FaultKind::Frozen)) });
         }
@@ -370,23 +416,35 @@ impl Evaluator {
 
     /// A ball that stands still although it is asked to move. If it is asked along one
     /// axis only, a dead servo of that axis is a rival cause; evidence from before the
-    /// ball stood decides.
+    /// ball stood decides. If along both, both servos at once are, as without power, unless they
+    /// have passed their tests. In a corner the ball stands if the plate takes it off every rim.
     fn stuck_ball(
         &self,
         evidence: &Evidence,
         readings: &Stillness,
         around: &Surroundings,
     ) -> Finding {
-        if around.at_edge || readings.unseen_s > 0.0 || !readings.has_positions {
-            return Finding::default();
-        }
         let pressed = |axis: Axis| {
             let still = &readings.axes[axis];
             still.pressed_s >= PRESSED_S && still.asked_widths >= TURNING_WIDTHS
         };
+        if readings.unseen_s > 0.0 || !readings.has_positions {
+            return Finding::default();
+        }
+        if around.at_edge {
+            // Of a ball at the rim across one axis, the servo of this axis is blamed: see `pinned`.
+            let cornered = around.rim.is_none() && !around.has_broken_servo;
+            let leaves = around.off_rim_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
+            let stands = readings.still_s() >= PRESSED_S;
+            return match cornered && leaves && stands {
+                true => stuck_or_servos(),
+                false => Finding::default(),
+            };
+        }
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,
-            (true, true) => Finding::fail(None),
+            (true, true) if around.servos_have_passed => Finding::fail(None),
+            (true, true) => stuck_or_servos(),
             (false, false) => Finding::default(),
             (true, false) => self.stuck_or_servo(Axis::X, evidence),
             (false, true) => self.stuck_or_servo(Axis::Y, evidence),
@@ -402,7 +460,7 @@ impl Evaluator {
             return Finding::default();
         }
         let weight = SERVO_SHARE + (1.0 - SERVO_SHARE) * share;
-        let servo = Candidate { code: FaultCode::servo(axis), kind: Some(FaultKind::Dead), weight };
+        let servo = Rival { part: RivalPart::Servo(axis), weight };
         Finding { rival: Some(servo), ..Finding::fail(None) }
     }
 }
@@ -442,6 +500,12 @@ fn pinned(
     around.rim == Some(axis) && around.rim_s >= window_s && outward && alive
 }
 
+/// A ball that stands although both servos ask it to move.
+fn stuck_or_servos() -> Finding {
+    let servos = Rival { part: RivalPart::BothServos, weight: SERVOS_SHARE };
+    Finding { rival: Some(servos), ..Finding::fail(None) }
+}
+
 /// The chapter's rule: enabled, and a residual of at least 0.01 m/s².
 fn textbook(axis: Axis, evidence: &Evidence) -> Finding {
     let e = &evidence.axes[axis];
@@ -472,9 +536,11 @@ mod tests {
         at_edge: false,
         rim: None,
         rim_s: 0.0,
+        off_rim_s: 0.0,
         over_the_edge: false,
         jumped: false,
         noisy_m: 1.0,
+        servos_have_passed: true,
         has_broken_servo: false,
     };
 
@@ -524,6 +590,38 @@ mod tests {
             Evaluator::new(Profile::Default, PerAxis::from_fn(|_| wide), SensorLimits::new(None));
         let evaluator = evaluator.with_suspicion(suspect_nats, PerAxis::from_fn(|_| 1.0));
         evaluator.stuck_ball(&evidence, &readings, &CLEAR)
+    }
+
+    /// A ball that stands although both servos ask it to move is stuck, if they have passed their tests;
+    /// else, and in a corner that the plate takes it out of, it may be the servos.
+    #[test]
+    fn a_ball_that_stands_may_be_due_to_both_servos() {
+        let stands = |off_rim_s: f64, around: Surroundings| {
+            let around = Surroundings { off_rim_s, ..around };
+            let mut readings = Stillness::default();
+            let reading = Reading {
+                dt: 0.5,
+                position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
+                asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
+                still_m: 1e-3,
+                refused: false,
+                outliers: 0,
+            };
+            (0..3).for_each(|_| readings.update(&reading));
+            let wide = PerAxis::from_fn(|_| Limits::new(Profile::Default, None, false, 7.0));
+            let evaluator = Evaluator::new(Profile::Default, wide, SensorLimits::new(None));
+            let found = evaluator.stuck_ball(&Evidence::default(), &readings, &around);
+            (found.test, found.rival.map(|rival| rival.part))
+        };
+        let both = (Test::Prefailed, Some(RivalPart::BothServos));
+        let nothing = (Test::NotTested, None);
+        assert_eq!(stands(0.0, CLEAR), (Test::Prefailed, None));
+        assert_eq!(stands(0.0, Surroundings { servos_have_passed: false, ..CLEAR }), both);
+        let corner = Surroundings { clear_s: 0.0, at_edge: true, ..CLEAR };
+        assert_eq!(stands(1.1, corner), both);
+        assert_eq!(stands(0.9, corner), nothing, "the rims may have held it until now");
+        assert_eq!(stands(1.1, Surroundings { rim: Some(Axis::X), ..corner }), nothing);
+        assert_eq!(stands(1.1, Surroundings { has_broken_servo: true, ..corner }), nothing);
     }
 
     /// A ball that rolls on, or whose servo is known to be broken, is not held back.

@@ -22,7 +22,7 @@ pub use calibration::{
     Prospects, SensorCalibration, ServoProspects, SessionEstimate,
 };
 pub use debounce::{Debounce, DebounceTimes, Qualified, Test};
-pub use evaluator::{Evaluator, Finding, LearntLimit, Surroundings};
+pub use evaluator::{Evaluator, Finding, LearntLimit, Rival, RivalPart, Surroundings};
 pub use evidence::{AxisEvidence, Candidate, Evidence, SURE_KIND, Suspicion, Transition};
 pub use limits::{Limits, SensorLimits};
 pub use memory::{FaultMemory, FaultRecord, InUse, MemoryRules};

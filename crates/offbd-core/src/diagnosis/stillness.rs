@@ -17,6 +17,10 @@ const RESTING_S: f64 = 0.25;
 /// uncertain whether they are alive. Chosen.
 const REPEATED_SHARE: f64 = 0.4;
 
+/// Time for which a hand may still move the ball that it sets down, s. Chosen: as long as no evidence
+/// against a servo is accumulated.
+const HAND_S: f32 = 1.0;
+
 /// Time constant of the count of recent outliers, s. Chosen.
 const OUTLIER_MEMORY_S: f64 = 10.0;
 
@@ -70,8 +74,9 @@ fn velocity_gain(since_s: f64) -> f64 {
 }
 
 impl AxisStillness {
-    /// `gain` is that of the velocity after one reading.
-    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) {
+    /// `gain` is that of the velocity after one reading. Returns whether the ball has moved.
+    fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) -> bool {
+        let is_first = self.anchor_m.is_none();
         let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
         let moved = strays && (self.strayed || self.anchor_m.is_none());
         self.strayed = strays;
@@ -89,6 +94,7 @@ impl AxisStillness {
             (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
         }
         self.repeat(position_m, reading.dt, gain);
+        moved && !is_first
     }
 
     fn repeat(&mut self, position_m: f64, dt: f64, gain: f64) {
@@ -140,6 +146,10 @@ pub struct Stillness {
     pub axes: PerAxis<AxisStillness>,
     /// Whether a ball has been seen in this session.
     pub has_positions: bool,
+    /// Whether the ball has moved in this session, after the time in which a hand sets it down.
+    pub has_moved: bool,
+    /// Time since the first reading of this session, s.
+    pub read_s: f32,
     /// Time since a ball was last seen, s; before the first one, only the time for which one was
     /// asked to move.
     pub unseen_s: f64,
@@ -152,7 +162,8 @@ pub struct Stillness {
 impl Stillness {
     /// Forgets the readings.
     pub fn restart(&mut self) {
-        *self = Self { has_positions: self.has_positions, ..Self::default() };
+        let Self { has_positions, read_s, has_moved, .. } = *self;
+        *self = Self { has_positions, read_s, has_moved, ..Self::default() };
     }
 
     /// Takes one sample.
@@ -173,9 +184,12 @@ impl Stillness {
             return;
         }
         let gain = velocity_gain(reading.dt);
+        self.read_s += if self.has_positions { reading.dt as f32 } else { 0.0 };
         for axis in Axis::ALL {
             if let Some(position_m) = reading.position_m[axis] {
-                self.axes[axis].update(position_m, reading.asked_m_s2[axis], reading, gain);
+                let asked_m_s2 = reading.asked_m_s2[axis];
+                let moved = self.axes[axis].update(position_m, asked_m_s2, reading, gain);
+                self.has_moved |= moved && self.read_s >= HAND_S;
             }
         }
     }
@@ -266,6 +280,22 @@ mod tests {
             most_widths = most_widths.max(watch.axes.x.asked_widths / 2.0);
         }
         assert!((1.0..6.5).contains(&most_widths), "{most_widths}");
+    }
+
+    #[test]
+    fn a_ball_has_moved_if_it_does_after_the_hand() {
+        let mut watch = Stillness::default();
+        let mut take = |n: u32, x: f64| {
+            (0..n).for_each(|_| watch.update(&reading(Some(x), true)));
+            watch.has_moved
+        };
+        assert!(!take(1, 0.05));
+        assert!(!take(90, 0.0), "a hand sets it down");
+        assert!(!take(20, 0.001), "it is noise");
+        assert!(take(2, 0.01));
+        assert!(take(100, 0.01), "it has moved before");
+        watch.restart();
+        assert!(watch.has_moved, "a gap in the readings does not change it");
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub(super) struct Edge {
     /// The axis whose rim the ball is at, and for how long, s.
     pub rim: Option<Axis>,
     pub rim_s: f64,
+    /// Time for which the plate has been taking the ball off every rim that it is at, s.
+    pub off_rim_s: f32,
     /// Sum of the jumps of the readings, m: if the sensor is off, the ball lies this far back from where
     /// it is read. Zero again once no ball can be there.
     displaced_m: PerAxis<f64>,
@@ -41,6 +43,7 @@ impl Edge {
             clear_s: 0.0,
             rim: None,
             rim_s: 0.0,
+            off_rim_s: 0.0,
             displaced_m: PerAxis::default(),
             recent: [None; 2],
         }
@@ -57,6 +60,7 @@ impl Edge {
     pub(super) fn restart(&mut self) {
         self.clear_s = 0.0;
         self.rim_s = 0.0;
+        self.off_rim_s = 0.0;
         self.recent = [None; 2];
     }
 
@@ -112,6 +116,19 @@ impl Edge {
             self.recent = [self.recent[1], Some((moment.at, place))];
         }
         self.clear_s = if self.at_edge { 0.0 } else { self.clear_s + dt };
+    }
+
+    /// Takes what the plate demands of the ball at the moment that was taken last: an acceleration of
+    /// `pull_m_s2`, of which the ball resists `least_m_s2`.
+    pub(super) fn pull(&mut self, pull_m_s2: &PerAxis<f64>, least_m_s2: f64, dt: f64) {
+        let takes_off = |place: &PerAxis<f64>| {
+            let near =
+                self.places(place).map(|at| self.plate.off_edge(&at, self.room_m, pull_m_s2));
+            near.into_iter().flatten().reduce(f64::min).is_some_and(|off| off >= least_m_s2)
+        };
+        let place = self.recent[1].as_ref().map(|(_, place)| place);
+        let off_rim = self.at_edge && self.plate.rim() && place.is_some_and(takes_off);
+        self.off_rim_s = if off_rim { self.off_rim_s + dt as f32 } else { 0.0 };
     }
 
     /// The places where the ball may be if it is read at `place`.
@@ -181,6 +198,25 @@ mod tests {
         edge.displace(Vector2::new(-0.07, 0.0));
         edge.take(&rest[2], 0.01, false);
         assert!(!edge.at_edge, "it would be beyond the rim: the ball was moved by hand");
+    }
+
+    /// A ball leaves the rim at +x if the plate takes it inward.
+    #[test]
+    fn a_rim_holds_a_ball_that_is_not_taken_off_it() {
+        let rig = Rig::chapter("a");
+        let left = |rig: &Rig, place: f64, pull: f64| {
+            let mut edge = Edge::new(rig);
+            for moment in &moments(&[place; 3]) {
+                edge.take(moment, 0.1, false);
+                edge.pull(&PerAxis { x: pull, y: 9.0 }, 0.1, 0.1);
+            }
+            edge.off_rim_s > 0.25
+        };
+        assert!(!left(&rig, 0.05, 0.0), "it is clear of the rim");
+        assert!(left(&rig, 0.18, -0.1) && left(&rig, -0.18, 0.1));
+        assert!(!left(&rig, 0.18, -0.09) && !left(&rig, 0.18, 0.5));
+        let open = Plate::new(rig.plate.shape(), 0.02, false).unwrap();
+        assert!(!left(&Rig { plate: open, ..rig }, 0.19, -1.0));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! One monitor over time: debounce, onset, and updates of the fault memory.
 
 use crate::diagnosis::{
-    Candidate, Debounce, DebounceTimes, Evidence, FaultMemory, Finding, Qualified, ServoAnswer,
-    Settings, Suspicion, Test, Transition,
+    Candidate, Debounce, DebounceTimes, Evidence, FaultMemory, Finding, Qualified, Rival,
+    RivalPart, ServoAnswer, Settings, Suspicion, Test, Transition,
 };
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
@@ -31,7 +31,7 @@ pub(super) struct Monitor {
     /// Onset of the present failure.
     since: Option<SimTime>,
     kind: Option<FaultKind>,
-    rival: Option<Candidate>,
+    rival: Option<Rival>,
     /// Largest evidence so far, nats.
     most_nats: f64,
     /// Closest approach to a trip by duration of failure, 0 to 1.
@@ -106,7 +106,9 @@ impl Monitor {
             true => Test::Prefailed,
             false => finding.test,
         };
-        let times = DebounceTimes::of(code, finding.kind, finding.rival.is_some(), settings);
+        // No motion of the plate tells a ball that stands from both servos: no use waiting for it.
+        let may_decide = finding.rival.is_some_and(|rival| rival.part != RivalPart::BothServos);
+        let times = DebounceTimes::of(code, finding.kind, may_decide, settings);
         let timed = self.debounce.update(test, dt, &times);
         self.nearest = self.nearest.max(self.debounce.progress(&times));
         let gathered_s = rising.map_or(0.0, |since| at - since);
@@ -230,8 +232,10 @@ impl Monitor {
         let candidates = match (self.rival, code.axis()) {
             (Some(rival), _) => {
                 let own = Candidate { code, kind: self.kind, weight: 1.0 - rival.weight };
-                let own_first = own.weight >= rival.weight;
-                if own_first { vec![own, rival] } else { vec![rival, own] }
+                let mut causes: Vec<Candidate> = rival.candidates().collect();
+                let own_first = causes.iter().all(|cause| own.weight >= cause.weight);
+                causes.insert(if own_first { 0 } else { causes.len() }, own);
+                causes
             }
             (None, Some(axis)) => kinds(code, evidence.axes[axis].answer),
             (None, None) => Vec::new(),

@@ -356,10 +356,13 @@ impl Pipeline {
     /// Stage: stillness, missing and identical readings.
     fn watch_readings(&mut self, moment: &Moment, dt: f64, refused: bool, outliers: u32) {
         let limits = *self.evaluator.limits();
+        let pull_m_s2 = PerAxis::from_fn(|a| moment.command[a].map_or(0.0, |_| self.pull_m_s2(a)));
+        let held_m_s2 = PerAxis::from_fn(|a| limits[a].pressing_m_s2());
         let asked_m_s2 = PerAxis::from_fn(|a| {
-            let pull_m_s2 = moment.command[a].map_or(0.0, |_| self.pull_m_s2(a));
-            if pull_m_s2 > limits[a].pressing_m_s2() { pull_m_s2 } else { 0.0 }
+            let size = pull_m_s2[a].abs();
+            if size > held_m_s2[a] { size } else { 0.0 }
         });
+        self.edge.pull(&pull_m_s2, held_m_s2.x.max(held_m_s2.y), dt);
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
@@ -371,8 +374,8 @@ impl Pipeline {
         });
     }
 
-    /// Returns the least acceleration that the plate demands of the ball along `axis`,
-    /// m/s², given the uncertainty of this session's level.
+    /// Returns the acceleration that the plate demands of the ball along `axis`, m/s²: the least that
+    /// the uncertainty of this session's level allows.
     fn pull_m_s2(&self, axis: Axis) -> f64 {
         self.servos[axis].least_pull_m_s2(self.twin.motion().acceleration[axis as usize])
     }
@@ -406,7 +409,7 @@ impl Pipeline {
     /// Whether the ball rests within its breakaway angle.
     fn rests(&self, axis: Axis) -> bool {
         let held_m_s2 = self.evaluator.limits()[axis].pressing_m_s2();
-        self.readings.axes[axis].rests() && self.pull_m_s2(axis) < held_m_s2
+        self.readings.axes[axis].rests() && self.pull_m_s2(axis).abs() < held_m_s2
     }
 
     /// Whether the ball's motion along `axis` can respond to the servo: not while the
@@ -422,7 +425,7 @@ impl Pipeline {
         let window_s = self.acceleration_filter.window_s(self.least_window_s());
         let see = |axis: Axis| {
             let mut e = self.axis_evidence(moment, axis, window_s);
-            let pull_m_s2 = self.pull_m_s2(axis);
+            let pull_m_s2 = self.pull_m_s2(axis).abs();
             e.enabled =
                 self.evaluator.enabled(axis, &e, window_s, pull_m_s2, &self.readings, around);
             let suspicious = self.monitors[FaultCode::servo(axis) as usize].suspicious();
@@ -519,9 +522,14 @@ impl Pipeline {
             at_edge: self.edge.at_edge,
             rim: self.edge.rim,
             rim_s: self.edge.rim_s,
+            off_rim_s: self.edge.off_rim_s.into(),
             over_the_edge: self.edge.at_edge && self.edge.is_open(),
             jumped: self.jumped(),
             noisy_m: self.noisy_m,
+            servos_have_passed: Axis::ALL.iter().all(|&axis| {
+                let status = memory.record(FaultCode::servo(axis)).status;
+                status.completed_this_cycle() && !status.failed_this_cycle()
+            }),
             has_broken_servo: Axis::ALL.iter().any(|&axis| {
                 let code = FaultCode::servo(axis);
                 memory.goes_on(code) && memory.record(code).status.failed_this_cycle()

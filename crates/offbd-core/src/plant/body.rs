@@ -2,7 +2,7 @@
 
 #[cfg(not(feature = "std"))]
 use crate::no_std::*;
-use crate::vocabulary::{Axis, Invalid, in_range, positive};
+use crate::vocabulary::{Axis, Invalid, PerAxis, in_range, positive};
 use serde::{Deserialize, Serialize};
 
 /// Standard gravity as the chapter rounds it, m/s².
@@ -184,6 +184,30 @@ impl Plate {
             _ => None,
         }
     }
+
+    /// Returns the least part of an acceleration that takes a ball at the point (x, y) off an edge
+    /// within `room_m` of it, in the unit of the acceleration; negative if one of these edges holds
+    /// the ball. `None` if there is none.
+    #[must_use]
+    pub fn off_edge(
+        &self,
+        place_m: &PerAxis<f64>,
+        room_m: f64,
+        pull: &PerAxis<f64>,
+    ) -> Option<f64> {
+        let PerAxis { x, y } = *place_m;
+        match self.shape {
+            PlateShape::Rectangle { .. } => {
+                let near = |&axis: &Axis| self.half_extent_m(axis) - place_m[axis].abs() < room_m;
+                let inward = |axis: Axis| -place_m[axis].signum() * pull[axis];
+                Axis::ALL.into_iter().filter(near).map(inward).reduce(f64::min)
+            }
+            PlateShape::Round { .. } => {
+                let is_near = self.edge_distance_m(x, y) < room_m;
+                is_near.then(|| -(x * pull.x + y * pull.y) / x.hypot(y))
+            }
+        }
+    }
 }
 
 impl Default for Plate {
@@ -206,5 +230,25 @@ mod tests {
         assert_eq!(plate.edge_axis(0.1, 0.0, 0.02), None);
         let disc = Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.02, true).unwrap();
         assert_eq!(disc.edge_axis(0.14, 0.0, 0.02), None);
+    }
+
+    #[test]
+    fn a_ball_leaves_an_edge_inward() {
+        let off = |plate: &Plate, x: f64, y: f64, pull_x: f64, pull_y: f64| {
+            plate.off_edge(&PerAxis { x, y }, 0.02, &PerAxis { x: pull_x, y: pull_y })
+        };
+        let plate = &Plate::CHAPTER;
+        assert_eq!(off(plate, 0.1, 0.0, -1.0, 0.0), None);
+        assert_eq!(off(plate, 0.18, 0.0, -1.0, 5.0), Some(1.0), "y is along the edge");
+        assert_eq!(off(plate, -0.18, 0.11, 3.0, -2.0), Some(2.0));
+        assert_eq!(
+            off(plate, -0.18, 0.11, 3.0, 2.0),
+            Some(-2.0),
+            "one edge of the corner holds it"
+        );
+        let disc = &Plate::new(PlateShape::Round { diameter_m: 0.3 }, 0.02, true).unwrap();
+        assert_eq!(off(disc, 0.0, 0.1, 0.0, -1.0), None);
+        let found = off(disc, 0.084, 0.112, -1.0, 0.0).unwrap();
+        assert!((found - 0.6).abs() < 1e-12, "{found}");
     }
 }

@@ -143,7 +143,7 @@ impl Verdict {
             code: code.into(),
             judged_s: monitor.judged_s,
             judged_share: monitor.judged_share,
-            outcome: self.outcome(code, monitor.reach),
+            outcome: self.outcome(code, suspected, monitor.reach),
             candidates: candidates.unwrap_or_default(),
             kinds,
         }
@@ -161,8 +161,7 @@ impl Verdict {
             .collect()
     }
 
-    fn outcome(&self, code: FaultCode, reach: Reach) -> Outcome {
-        let suspected = self.suspected[code as usize].as_deref();
+    fn outcome(&self, code: FaultCode, suspected: Option<&Suspicion>, reach: Reach) -> Outcome {
         match (self.confirmed.contains(&code), suspected, reach) {
             (true, Some(suspicion), _) if is_ambiguous(suspicion) => Outcome::CannotTell,
             (true, ..) => Outcome::Fault,

@@ -65,18 +65,27 @@ fn deciding_motion(transition: &Transition) -> String {
     if !is_ambiguous(suspicion) {
         return String::new();
     }
-    let servo = suspicion.candidates.iter().find_map(|c| c.code.axis());
-    let motion = match servo.map(Axis::other) {
+    let mut servos = suspicion.candidates.iter().filter_map(|c| c.code.axis());
+    let motion = match (servos.next().map(Axis::other), servos.next()) {
+        (Some(_), Some(_)) => {
+            "a push by hand would decide: if the ball then rolls, it is not stuck, \
+                               and the servos may have no power"
+                .to_owned()
+        }
         // The other servo moves the ball unless it is stuck.
-        Some(axis) if transition.evidence.axes[axis].command_rad.is_some() => format!(
+        (Some(axis), None) if transition.evidence.axes[axis].command_rad.is_some() => format!(
             "tilting by {} would decide, as the drive cycle does: a ball that then rolls along {} \
              is not stuck",
             axis.command(),
             axis.as_str()
         ),
-        Some(_) => "a push by hand would decide: a ball that then rolls is not stuck".to_owned(),
-        None => "moving the ball by hand would decide: readings that then stay the same are frozen"
-            .to_owned(),
+        (Some(_), None) => {
+            "a push by hand would decide: a ball that then rolls is not stuck".to_owned()
+        }
+        (None, _) => {
+            "moving the ball by hand would decide: readings that then stay the same are frozen"
+                .to_owned()
+        }
     };
     format!("; {motion}")
 }

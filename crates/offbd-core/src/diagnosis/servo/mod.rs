@@ -383,12 +383,13 @@ impl ServoFilterBank {
         self.log_likelihood_nats
     }
 
-    /// Returns the least acceleration that the plate demands of the ball, m/s², given the
-    /// twin's acceleration `twin_m_s2` and the uncertainty of the session's level.
+    /// Returns the acceleration that the plate demands of the ball, m/s², of the least size that the
+    /// twin's acceleration `twin_m_s2` and the uncertainty of the session's level allow.
     #[must_use]
     pub fn least_pull_m_s2(&self, twin_m_s2: f64) -> f64 {
         let (offset, variance) = self.healthy.parameter(0);
-        ((twin_m_s2 + offset).abs() - LEVEL_ERRORS * variance.sqrt()).max(0.0)
+        let pull = twin_m_s2 + offset;
+        (pull.abs() - LEVEL_ERRORS * variance.sqrt()).max(0.0).copysign(pull)
     }
 
     /// The offset of this session, averaged over 20 s, m/s²; a fault that has just begun

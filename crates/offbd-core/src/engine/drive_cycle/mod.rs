@@ -65,7 +65,8 @@ pub struct FaultVerdict {
     /// Time of confirmation in the slowest trial, s after the start; `None` unless every
     /// trial confirmed it.
     pub after_s: Option<f64>,
-    /// A rival cause that is named as well.
+    /// A rival cause that is named as well; not both servos at once, as no motion of the plate
+    /// tells these from a ball that stands.
     pub beside: Option<FaultCode>,
 }
 

@@ -14,7 +14,7 @@ use crate::vocabulary::{Axis, PerAxis};
 /// The timing of both axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Both axes at once: a ball that stands is then stuck, whatever the servos do.
+    /// Both axes at once: a ball that stands is then stuck, or both servos are dead.
     AtOnce,
     /// Both axes, y a quarter of a period after x.
     Staggered,

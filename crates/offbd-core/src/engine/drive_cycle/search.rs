@@ -214,7 +214,11 @@ impl Search {
             *n_judged += outcome.n_judged;
             let named = outcome.confirmed.and_then(|(at_s, transition)| {
                 let rivals = &transition.suspicion.candidates;
-                let beside = rivals.iter().map(|c| c.code).find(|&code| code != fault.code());
+                let others = || rivals.iter().map(|c| c.code).filter(|&code| code != fault.code());
+                // No motion of the plate tells a ball that stands from servos without power.
+                let has_both =
+                    Axis::ALL.iter().all(|&a| others().any(|c| c == FaultCode::servo(a)));
+                let beside = others().next().filter(|_| !has_both);
                 let named = |c: &Candidate| (c.code, c.kind) == (fault.code(), fault.kind());
                 let own = transition.code == fault.code() || rivals.iter().any(named);
                 let in_time = at_s <= IN_TIME * cycle.duration_s;
