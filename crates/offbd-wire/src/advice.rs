@@ -53,7 +53,7 @@ pub fn checks(code: AlarmCodeWord, kind: Option<KindWord>) -> &'static [&'static
             "Camera: look at light and focus. Touch panel: clean it and look at its plug.",
         ],
         AlarmCodeWord::StuckBall => &[
-            "Push the ball by hand: does it roll freely?",
+            "Push the ball by hand: does it roll freely? If so, do both servos have power?",
             "Clean the plate and the ball; look for something sticky or a dent.",
             "Is the ball caught at the rim, a cable or a screw?",
         ],

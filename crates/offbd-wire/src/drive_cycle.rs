@@ -83,8 +83,8 @@ pub struct CycleFaultView {
     /// not confirm it.
     pub after_s: Option<f64>,
     /// Code of another cause that would explain the same readings and is named as well;
-    /// null if there is none. Both servos without power are always named beside a ball that
-    /// does not move, and not given here: no motion of the plate tells the two apart.
+    /// null if there is none. Both servos at once, as without power, may be named beside a stuck
+    /// ball as well. They are not given here: no motion of the plate tells the two apart.
     pub beside: Option<CodeWord>,
 }
 

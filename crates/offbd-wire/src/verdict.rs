@@ -5,7 +5,9 @@ mod kind_words;
 mod outcome;
 mod sentence;
 
-pub use kind_words::{code_title, code_words, fault_title, is_probable, kind_words, status_words};
+pub use kind_words::{
+    code_title, code_words, fault_title, is_probable, kind_words, status_words, weighed_causes,
+};
 pub use outcome::{JudgedView, NamedKindView, Outcome};
 pub use sentence::sentence;
 
@@ -74,7 +76,8 @@ pub struct CandidateView {
     pub code: CodeWord,
     /// Failure mode; null for a code without kinds.
     pub kind: Option<KindWord>,
-    /// Weight in (0, 1]; the weights of all candidates sum to one.
+    /// Weight in (0, 1]; the weights of all candidates sum to one. Two servos beside a stuck ball are
+    /// one cause, both without power, and each has half of its weight.
     pub weight: f64,
 }
 

@@ -1,6 +1,6 @@
 /** The verdict of a session as text. */
 import type { Candidate, FaultCode, FaultLine, JudgedMonitor, Outcome, Summary } from "../api/types";
-import { codeTitle, faultTitle, kindText } from "./fault-names";
+import { codeMeaning, codeTitle, faultTitle, kindMeaning, kindText } from "./fault-names";
 import { seconds } from "./numbers";
 import { capitalised } from "./sentence";
 import { duration } from "./time";
@@ -9,14 +9,42 @@ import { duration } from "./time";
 export const judgedShare = (monitor: { judged_share?: number; judged_s?: number }) =>
   `${Math.round((monitor.judged_share ?? 0) * 100)} %, ${duration(monitor.judged_s ?? 0)}`;
 
+/** A possible cause of a fault. */
+interface Cause {
+  title: string;
+  meaning: string;
+  weight: number;
+}
+
+const sum = (weights: number[]) => weights.reduce((all, weight) => all + weight, 0);
+
+/** Returns the causes that the candidates are. Two servos beside another cause are one: both without power. */
+export function causesOf(candidates: Candidate[]): Cause[] {
+  const servos = candidates.filter(({ code }) => code.endsWith("_servo"));
+  const areTwo = servos.length < candidates.length && servos.some(({ code }) => code !== servos[0]!.code);
+  const alone = areTwo ? candidates.filter((each) => !servos.includes(each)) : candidates;
+  const causes = alone.map(({ code, kind, weight }) => ({
+    title: faultTitle({ code, kind }),
+    meaning: kind ? kindMeaning(kind) : codeMeaning(code),
+    weight,
+  }));
+  if (!areTwo) return causes;
+  const both = {
+    title: "Both servos",
+    meaning: "do not respond, as without power",
+    weight: sum(servos.map(({ weight }) => weight)),
+  };
+  return [...causes, both];
+}
+
 /**
- * Returns the candidates with their weights if they are in different parts of the rig, so that the
+ * Returns the causes with their weights if they are in different parts of the rig, so that the
  * evidence does not distinguish them; otherwise an empty string.
  */
 export function ambiguousCauses(candidates: Candidate[]): string {
   if (!candidates.some(({ code }) => code !== candidates[0]!.code)) return "";
-  const [first, ...others] = candidates.map(
-    ({ code, kind, weight }) => `${faultTitle({ code, kind })} ${Math.round(weight * 100)} %`,
+  const [first, ...others] = causesOf(candidates).map(
+    ({ title, weight }) => `${title} ${Math.round(weight * 100)} %`,
   );
   return `Cannot tell: ${first} or ${others.join(" or ")}`;
 }

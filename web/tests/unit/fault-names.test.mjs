@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { alarmTitle } from "../../src/words/alarm.ts";
 import { codeTitle, faultMeaning, faultTitle, kindMeaning } from "../../src/words/fault-names.ts";
 import { repairNote } from "../../src/words/fault-state.ts";
-import { verdict } from "../../src/words/verdict.ts";
+import { ambiguousCauses, verdict } from "../../src/words/verdict.ts";
 
 test("known codes and kinds have titles, unknown ones are shown as plain text", () => {
   assert.equal(faultTitle({ code: "x_servo", kind: "gain" }), "X servo (gain)");
@@ -19,6 +19,17 @@ test("a banner says what is wrong, also if the kind is not known", () => {
   assert.equal(faultMeaning(dead), "does not respond: the plate returns to zero");
   assert.equal(faultMeaning(dead, true), "did not respond: the plate returned to zero");
   assert.equal(faultMeaning({ code: "sensor" }), "the readings are implausible");
+});
+
+test("two servos beside a stuck ball are one cause", () => {
+  const servo = { code: "x_servo", kind: "dead", weight: 0.25 };
+  const ball = { code: "stuck_ball", kind: null, weight: 0.5 };
+  const told = (...candidates) => ambiguousCauses(candidates);
+  assert.equal(
+    told(ball, servo, { ...servo, code: "y_servo" }),
+    "Cannot tell: Stuck ball 50 % or Both servos 50 %",
+  );
+  assert.equal(told(ball, { ...servo, weight: 0.5 }), "Cannot tell: Stuck ball 50 % or X servo (dead) 50 %");
 });
 
 test("a kind that is not much likelier than the others is stated as probable, with its weight", () => {

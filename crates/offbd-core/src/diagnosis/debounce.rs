@@ -37,17 +37,22 @@ pub struct DebounceTimes {
 impl DebounceTimes {
     /// Returns the times for `code`. Servos have a slow leak, because a loose contact
     /// comes and goes. Readings and ball fail sooner. A ball that stands fails as soon as
-    /// readings do on a learnt rig, unless there is a `rival` cause with the same
-    /// symptoms, which needs time to show. Of the sensor's kinds of fault, noise has
+    /// readings do on a learnt rig, unless time `may_decide` between it and another cause with
+    /// the same symptoms. Of the sensor's kinds of fault, noise has
     /// its own time.
     #[must_use]
-    pub fn of(code: FaultCode, kind: Option<FaultKind>, rival: bool, settings: &Settings) -> Self {
+    pub fn of(
+        code: FaultCode,
+        kind: Option<FaultKind>,
+        may_decide: bool,
+        settings: &Settings,
+    ) -> Self {
         let Settings { fail_s, confirm_s, pass_s, .. } = *settings;
         match code {
             FaultCode::XServo | FaultCode::YServo => {
                 Self { fail_s, confirm_s, pass_s, leak_s: settings.leak_s }
             }
-            FaultCode::StuckBall if rival || !settings.learnt => {
+            FaultCode::StuckBall if may_decide || !settings.learnt => {
                 Self { fail_s, confirm_s, pass_s, leak_s: pass_s }
             }
             FaultCode::StuckBall | FaultCode::Sensor => Self {

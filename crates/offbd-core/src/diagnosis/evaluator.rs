@@ -61,8 +61,8 @@ const SERVO_SHARE: f64 = 0.4;
 /// their supply, if the servos have not passed their tests in this session or the ball has got into a
 /// corner. Chosen, not measured: a rig without power is as likely as a ball that is held.
 const SERVOS_SHARE: f64 = 0.5;
-/// Time for which the plate must have taken a ball off the rim that stays there, s. Chosen: it would
-/// have rolled several centimetres.
+/// Time for which the plate must have pulled a ball off its rims before the ball counts as standing
+/// there, s. Chosen: it would have rolled several centimetres.
 const OFF_RIM_S: f64 = 1.0;
 /// Weight of a stuck ball as the cause of identical readings, as long as nothing
 /// distinguishes the two. Chosen, not measured: a stuck ball is the rarer cause.
@@ -99,7 +99,8 @@ pub struct Surroundings {
     pub clear_s: f64,
     /// Whether the ball was last seen at the edge.
     pub at_edge: bool,
-    /// The axis whose rim the ball lies at; `None` in a corner.
+    /// The axis whose rim the ball lies at; `None` in a corner, at the rim of a round plate and away
+    /// from rims.
     pub rim: Option<Axis>,
     /// Time for which the ball has lain there, s.
     pub rim_s: f64,
@@ -111,7 +112,7 @@ pub struct Surroundings {
     pub jumped: bool,
     /// Scatter above which readings count as noisy, m.
     pub noisy_m: f64,
-    /// Whether the tests of both servos have passed in this session, and never failed.
+    /// Whether the tests of both servos have had a result in this session, of which the last is a pass.
     pub servos_have_passed: bool,
     /// Whether a fault of a servo that was found in this session goes on.
     pub has_broken_servo: bool,
@@ -301,7 +302,7 @@ impl Evaluator {
             Test::Prefailed => Finding::default(),
             _ => self.stuck_ball(evidence, readings, around).or(held_back(evidence, around)),
         };
-        // What holds a ball that has not moved yet, the monitor of the ball tells; at a rim the servo's.
+        // Until the ball has moved, only its own monitor tells what holds it; at an edge the servos' do.
         let has_never_moved = !readings.has_moved && !around.at_edge;
         let blind = has_never_moved || [sensor, stuck].iter().any(|f| f.test == Test::Prefailed);
         let servo = |axis| match blind {
@@ -416,8 +417,9 @@ impl Evaluator {
 
     /// A ball that stands still although it is asked to move. If it is asked along one
     /// axis only, a dead servo of that axis is a rival cause; evidence from before the
-    /// ball stood decides. If along both, both servos at once are, as without power, unless they
-    /// have passed their tests. In a corner the ball stands if the plate takes it off every rim.
+    /// ball stood decides. If along both, both servos are, as without power, unless they have
+    /// passed their tests or one is known to be broken. In a corner, or at the rim of a disc, the
+    /// ball counts as asked only while the plate pulls it off every rim.
     fn stuck_ball(
         &self,
         evidence: &Evidence,
@@ -436,14 +438,17 @@ impl Evaluator {
             let cornered = around.rim.is_none() && !around.has_broken_servo;
             let leaves = around.off_rim_s >= OFF_RIM_S && Axis::ALL.into_iter().all(pressed);
             let stands = readings.still_s() >= PRESSED_S;
-            return match cornered && leaves && stands {
+            let alive = Axis::ALL.into_iter().any(|a| !self.dead(a, &readings.axes[a]));
+            return match cornered && leaves && stands && alive {
                 true => stuck_or_servos(),
                 false => Finding::default(),
             };
         }
         match (pressed(Axis::X), pressed(Axis::Y)) {
             _ if readings.still_s() < PRESSED_S => Finding::PASS,
-            (true, true) if around.servos_have_passed => Finding::fail(None),
+            (true, true) if around.servos_have_passed || around.has_broken_servo => {
+                Finding::fail(None)
+            }
             (true, true) => stuck_or_servos(),
             (false, false) => Finding::default(),
             (true, false) => self.stuck_or_servo(Axis::X, evidence),
@@ -596,23 +601,26 @@ mod tests {
     /// else, and in a corner that the plate takes it out of, it may be the servos.
     #[test]
     fn a_ball_that_stands_may_be_due_to_both_servos() {
-        let stands = |off_rim_s: f64, around: Surroundings| {
+        let found = |off_rim_s: f64, around: Surroundings, frozen: bool| {
             let around = Surroundings { off_rim_s, ..around };
             let mut readings = Stillness::default();
-            let reading = Reading {
-                dt: 0.5,
-                position_m: PerAxis { x: Some(0.0), y: Some(0.0) },
-                asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
-                still_m: 1e-3,
-                refused: false,
-                outliers: 0,
-            };
-            (0..3).for_each(|_| readings.update(&reading));
+            for i in 0..8 {
+                let position_m = if frozen { 0.0 } else { 1e-6 * f64::from(i) };
+                readings.update(&Reading {
+                    dt: 0.5,
+                    position_m: PerAxis { x: Some(position_m), y: Some(position_m) },
+                    asked_m_s2: PerAxis { x: 1.0, y: 1.0 },
+                    still_m: 1e-3,
+                    refused: false,
+                    outliers: 0,
+                });
+            }
             let wide = PerAxis::from_fn(|_| Limits::new(Profile::Default, None, false, 7.0));
             let evaluator = Evaluator::new(Profile::Default, wide, SensorLimits::new(None));
             let found = evaluator.stuck_ball(&Evidence::default(), &readings, &around);
             (found.test, found.rival.map(|rival| rival.part))
         };
+        let stands = |off_rim_s: f64, around: Surroundings| found(off_rim_s, around, false);
         let both = (Test::Prefailed, Some(RivalPart::BothServos));
         let nothing = (Test::NotTested, None);
         assert_eq!(stands(0.0, CLEAR), (Test::Prefailed, None));
@@ -621,7 +629,10 @@ mod tests {
         assert_eq!(stands(1.1, corner), both);
         assert_eq!(stands(0.9, corner), nothing, "the rims may have held it until now");
         assert_eq!(stands(1.1, Surroundings { rim: Some(Axis::X), ..corner }), nothing);
+        assert_eq!(found(1.1, corner, true), nothing, "the readings may be frozen");
         assert_eq!(stands(1.1, Surroundings { has_broken_servo: true, ..corner }), nothing);
+        let broken = Surroundings { servos_have_passed: false, has_broken_servo: true, ..CLEAR };
+        assert_eq!(stands(0.0, broken), (Test::Prefailed, None), "that servo is known");
     }
 
     /// A ball that rolls on, or whose servo is known to be broken, is not held back.

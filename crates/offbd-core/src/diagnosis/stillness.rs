@@ -74,12 +74,13 @@ fn velocity_gain(since_s: f64) -> f64 {
 }
 
 impl AxisStillness {
-    /// `gain` is that of the velocity after one reading. Returns whether the ball has moved.
+    /// `gain` is that of the velocity after one reading. Returns whether the ball has just left its
+    /// place; false for the first reading.
     fn update(&mut self, position_m: f64, asked_m_s2: f64, reading: &Reading, gain: f64) -> bool {
         let is_first = self.anchor_m.is_none();
         let strays = self.anchor_m.is_none_or(|a| (position_m - a).abs() > reading.still_m);
         let moved = strays && (self.strayed || self.anchor_m.is_none());
-        self.strayed = strays;
+        self.strayed = strays && !is_first;
         if moved {
             self.anchor_m = Some(position_m);
             self.still_s = 0.0;
@@ -91,10 +92,15 @@ impl AxisStillness {
             self.asked_m_s += asked_m_s2 * reading.dt;
             self.asked_widths += self.asked_m_s * reading.dt / reading.still_m;
         } else {
-            (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
+            self.release();
         }
         self.repeat(position_m, reading.dt, gain);
         moved && !is_first
+    }
+
+    /// The ball is not asked to move, or it does.
+    const fn release(&mut self) {
+        (self.pressed_s, self.asked_m_s, self.asked_widths) = (0.0, 0.0, 0.0);
     }
 
     fn repeat(&mut self, position_m: f64, dt: f64, gain: f64) {
@@ -148,8 +154,8 @@ pub struct Stillness {
     pub has_positions: bool,
     /// Whether the ball has moved in this session, after the time in which a hand sets it down.
     pub has_moved: bool,
-    /// Time since the first reading of this session, s.
-    pub read_s: f32,
+    /// Time since the first reading of this session without gaps and refused readings, s.
+    read_s: f32,
     /// Time since a ball was last seen, s; before the first one, only the time for which one was
     /// asked to move.
     pub unseen_s: f64,
@@ -190,6 +196,8 @@ impl Stillness {
                 let asked_m_s2 = reading.asked_m_s2[axis];
                 let moved = self.axes[axis].update(position_m, asked_m_s2, reading, gain);
                 self.has_moved |= moved && self.read_s >= HAND_S;
+            } else if reading.asked_m_s2[axis] == 0.0 {
+                self.axes[axis].release();
             }
         }
     }

@@ -185,9 +185,9 @@ impl Plate {
         }
     }
 
-    /// Returns the least part of an acceleration that takes a ball at the point (x, y) off an edge
-    /// within `room_m` of it, in the unit of the acceleration; negative if one of these edges holds
-    /// the ball. `None` if there is none.
+    /// Returns the least of the inward components that an acceleration has at the edges within
+    /// `room_m` of the point (x, y), in the unit of the acceleration; negative if one of these edges
+    /// holds the ball. `None` if no edge is near, and in the middle of a round plate.
     #[must_use]
     pub fn off_edge(
         &self,
@@ -203,8 +203,9 @@ impl Plate {
                 Axis::ALL.into_iter().filter(near).map(inward).reduce(f64::min)
             }
             PlateShape::Round { .. } => {
-                let is_near = self.edge_distance_m(x, y) < room_m;
-                is_near.then(|| -(x * pull.x + y * pull.y) / x.hypot(y))
+                let from_middle_m = x.hypot(y);
+                let is_near = self.edge_distance_m(x, y) < room_m && from_middle_m > 0.0;
+                is_near.then(|| -(x * pull.x + y * pull.y) / from_middle_m)
             }
         }
     }

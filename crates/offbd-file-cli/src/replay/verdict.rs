@@ -9,7 +9,7 @@ use offbd_core::vocabulary::FaultCode;
 use offbd_terminal::table::{self, Look};
 use offbd_wire::verdict::{
     CandidateView, FaultView, JudgedView, NamedKindView, Outcome, SummaryView, fault_title,
-    kind_words,
+    kind_words, weighed_causes,
 };
 
 /// The verdict on a session in a few words, in colour where stdout shows it. What was not judged beside
@@ -111,10 +111,8 @@ fn found(session: &JudgedSession, code: CodeWord) -> String {
 }
 
 fn causes(candidates: &[CandidateView]) -> String {
-    let word = |c: &CandidateView| {
-        format!("{} {:.0} %", fault_title(c.code, c.kind, 1.0), 100.0 * c.weight)
-    };
-    let causes: Vec<String> = candidates.iter().map(word).collect();
+    let causes: Vec<_> = candidates.iter().map(|c| (c.code.into(), c.kind, c.weight)).collect();
+    let causes = weighed_causes(&causes, FaultCode::as_str);
     format!("cannot tell {}", causes.join(" from "))
 }
 

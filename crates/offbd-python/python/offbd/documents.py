@@ -1067,7 +1067,8 @@ class Candidate(TypedDict):
     kind: NotRequired[FaultKind | None]
     weight: float
     """
-    Weight in (0, 1]; the weights of all candidates sum to one.
+    Weight in (0, 1]; the weights of all candidates sum to one. Two servos beside a stuck ball are
+    one cause, both without power, and each has half of its weight.
     """
 
 

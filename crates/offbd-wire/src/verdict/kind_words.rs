@@ -26,6 +26,30 @@ pub fn fault_title(code: impl Display, kind: Option<impl Display>, weight: f64) 
     }
 }
 
+/// A possible cause: the part, its kind of fault, and its weight.
+type Cause<K> = (FaultCode, Option<K>, f64);
+
+/// Returns possible causes with their weights, as `x_servo (dead) 40 %`, with the codes as `name` has
+/// them. Two servos beside another cause are one: both without power.
+#[must_use]
+pub fn weighed_causes<K: Copy + Display>(
+    candidates: &[Cause<K>],
+    name: fn(FaultCode) -> &'static str,
+) -> Vec<String> {
+    let weighed = |title: String, weight: f64| format!("{title} {:.0} %", 100.0 * weight);
+    let alone =
+        |&&(code, kind, weight): &&Cause<K>| weighed(fault_title(name(code), kind, 1.0), weight);
+    let is_servo = |(code, ..): &&Cause<K>| code.axis().is_some();
+    let (servos, others): (Vec<&Cause<K>>, Vec<_>) = candidates.iter().partition(is_servo);
+    let are_two = servos.iter().any(|(code, ..)| *code != servos[0].0);
+    if others.is_empty() || !are_two {
+        return candidates.iter().map(|cause| alone(&cause)).collect();
+    }
+    let both = fault_title("both servos", servos[0].1, 1.0);
+    let weight = servos.iter().map(|(.., weight)| weight).sum();
+    others.iter().map(alone).chain([weighed(both, weight)]).collect()
+}
+
 /// Returns what a code blames, in words for people, as within a sentence.
 #[must_use]
 pub const fn code_words(code: FaultCode) -> &'static str {

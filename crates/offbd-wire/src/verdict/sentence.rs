@@ -1,6 +1,8 @@
 //! Describes a transition and its evidence in one sentence, whose form depends on the kind.
 
-use super::kind_words::{code_title, code_words, fault_title, is_probable, status_words};
+use super::kind_words::{
+    code_title, code_words, fault_title, is_probable, status_words, weighed_causes,
+};
 use super::outcome::is_ambiguous;
 use crate::fault_kind::{Finding, answered_share, kind_text};
 use offbd_core::diagnosis::{
@@ -45,12 +47,13 @@ fn weight(suspicion: &Suspicion) -> f64 {
 /// kinds of one part. Empty if there is nothing.
 fn undecided(suspicion: &Suspicion) -> String {
     let candidates = &suspicion.candidates;
-    let weighed = |word: String, c: &Candidate| format!("{word} {:.0} %", 100.0 * c.weight);
-    let causes =
-        || candidates.iter().map(|c| weighed(fault_title(code_words(c.code), c.kind, 1.0), c));
-    let kinds = || candidates.iter().filter_map(|c| Some(weighed(c.kind?.to_string(), c)));
+    let causes: Vec<_> = candidates.iter().map(|c| (c.code, c.kind, c.weight)).collect();
+    let weighed = |c: &Candidate| Some(format!("{} {:.0} %", c.kind?, 100.0 * c.weight));
+    let kinds = || candidates.iter().filter_map(weighed);
     match (is_ambiguous(suspicion), suspicion.kind) {
-        (true, _) => format!("cannot tell {}; ", causes().collect::<Vec<_>>().join(" from ")),
+        (true, _) => {
+            format!("cannot tell {}; ", weighed_causes(&causes, code_words).join(" from "))
+        }
         (false, None) if candidates.len() > 1 => {
             format!("cannot tell which kind: {}; ", kinds().collect::<Vec<_>>().join(", "))
         }
@@ -65,12 +68,11 @@ fn deciding_motion(transition: &Transition) -> String {
     if !is_ambiguous(suspicion) {
         return String::new();
     }
+    let by_hand = "a push by hand would decide";
     let mut servos = suspicion.candidates.iter().filter_map(|c| c.code.axis());
     let motion = match (servos.next().map(Axis::other), servos.next()) {
         (Some(_), Some(_)) => {
-            "a push by hand would decide: if the ball then rolls, it is not stuck, \
-                               and the servos may have no power"
-                .to_owned()
+            format!("{by_hand}: if the ball then rolls, do both servos have power?")
         }
         // The other servo moves the ball unless it is stuck.
         (Some(axis), None) if transition.evidence.axes[axis].command_rad.is_some() => format!(
@@ -79,13 +81,10 @@ fn deciding_motion(transition: &Transition) -> String {
             axis.command(),
             axis.as_str()
         ),
-        (Some(_), None) => {
-            "a push by hand would decide: a ball that then rolls is not stuck".to_owned()
-        }
-        (None, _) => {
-            "moving the ball by hand would decide: readings that then stay the same are frozen"
-                .to_owned()
-        }
+        (Some(_), None) => format!("{by_hand}: a ball that then rolls is not stuck"),
+        (None, _) => "moving the ball by hand would decide: readings that then stay the same are \
+                      frozen"
+            .to_owned(),
     };
     format!("; {motion}")
 }

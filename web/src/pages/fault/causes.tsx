@@ -1,6 +1,6 @@
 import type { FaultEntry } from "../../api/types";
 import { Facts } from "../../parts/facts";
-import { codeMeaning, faultTitle, kindMeaning } from "../../words/fault-names";
+import { causesOf } from "../../words/verdict";
 import { faultFacts } from "./fault-facts";
 
 /** The candidates of the diagnosis; without any, the fault itself unless it is cleared. */
@@ -17,14 +17,14 @@ export function Causes({ fault }: { fault: FaultEntry }) {
       <h2>Possible causes</h2>
       {candidates.length === 0 && <p class="quiet">None.</p>}
       <ul class="candidates">
-        {candidates.map(({ code, kind, weight }) => (
+        {causesOf(candidates).map(({ title, meaning, weight }) => (
           <li>
             <span>
-              <b>{faultTitle({ code, kind })}</b>
+              <b>{title}</b>
               <br />
-              <span class="quiet">{kind ? kindMeaning(kind) : codeMeaning(code)}</span>
+              <span class="quiet">{meaning}</span>
             </span>
-            <meter min={0} max={1} value={weight} aria-label={`Weight of ${faultTitle({ code, kind })}`} />
+            <meter min={0} max={1} value={weight} aria-label={`Weight of ${title}`} />
             <span class="n">{Math.round(weight * 100)} %</span>
           </li>
         ))}
