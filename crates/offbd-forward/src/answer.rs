@@ -155,3 +155,6 @@ pub(super) fn shortened(text: &str) -> String {
     }
     format!("{}…", &text[..text.floor_char_boundary(MAX_REASON_BYTES)])
 }
+
+#[cfg(test)]
+mod tests;
