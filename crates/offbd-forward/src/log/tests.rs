@@ -43,6 +43,29 @@ fn contents(log: &mut Log) -> Vec<(i64, NewBatch, bool, bool)> {
     contents
 }
 
+/// Compares what the log says of its batches with `model`: each batch, and whether it is set aside.
+fn assert_told(log: &Log, model: &BTreeMap<i64, (NewBatch, bool)>) {
+    let waiting: Vec<_> = model.iter().filter(|(_, (_, is_refused))| !is_refused).collect();
+    let of = |asset: &str| waiting.iter().find(|(_, (batch, _))| batch.asset == asset);
+    assert_eq!(log.n_waiting(), waiting.len());
+    let mut assets: Vec<&str> = Vec::new();
+    for (_, (batch, _)) in &waiting {
+        if !assets.contains(&batch.asset.as_str()) {
+            assets.push(&batch.asset);
+        }
+    }
+    assert_eq!(log.assets(), assets, "in the order of their oldest batch");
+    for asset in ["a", "b", "c", "d", "other"] {
+        assert_eq!(log.oldest(asset), of(asset).map(|(id, _)| **id));
+    }
+    let refused = model.iter().filter(|(_, (_, is_refused))| *is_refused);
+    let refused = refused.map(|(id, (batch, _))| (*id, batch.body.len() as u64));
+    assert!(log.refused().eq(refused));
+    for id in 0..=log.next_id {
+        assert_eq!(log.is_refused(id), model.get(&id).is_some_and(|(_, is_refused)| *is_refused));
+    }
+}
+
 /// A file with batches that wait, one that is set aside, and free tiles between them.
 fn filled(log: &mut Log) {
     for n in 0..8 {
@@ -187,16 +210,33 @@ fn any_changes_are_there_after_a_restart_and_the_file_does_not_grow() {
             let expected: Vec<_> =
                 model.iter().map(|(id, (batch, is))| (*id, batch.clone(), *is, false)).collect();
             assert_eq!(contents(&mut log), expected);
+            assert_told(&log, &model);
             most = most.max(log.used_bytes());
         }
-        let n_waiting = model.values().filter(|(_, is_refused)| !is_refused).count();
-        assert_eq!(log.n_waiting(), n_waiting);
         let length = fixture.path.metadata().unwrap().len();
         assert!(length < 3 * most, "{length} bytes for {most}");
         model.keys().for_each(|id| log.remove(*id).unwrap());
         log.shrink().unwrap();
         assert_eq!(fixture.path.metadata().unwrap().len(), FIRST * BLOCK);
     }
+}
+
+/// As from the database of an earlier version, in any order.
+#[test]
+fn batches_that_are_added_keep_their_ids_and_later_ones_follow() {
+    let fixture = Fixture::new();
+    let mut log = fixture.open();
+    log.add(7, &batch("a", 1, 10), None).unwrap();
+    log.add(3, &batch("b", 2, 20), Some("no".into())).unwrap();
+    log.put(&batch("c", 3, 30)).unwrap();
+    let model = BTreeMap::from([
+        (3, (batch("b", 2, 20), true)),
+        (7, (batch("a", 1, 10), false)),
+        (8, (batch("c", 3, 30), false)),
+    ]);
+    assert_told(&log, &model);
+    drop(log.into_file().unwrap());
+    assert_told(&fixture.open(), &model);
 }
 
 #[test]
