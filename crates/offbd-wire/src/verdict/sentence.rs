@@ -72,7 +72,7 @@ fn deciding_motion(transition: &Transition) -> String {
     let mut servos = suspicion.candidates.iter().filter_map(|c| c.code.axis());
     let motion = match (servos.next().map(Axis::other), servos.next()) {
         (Some(_), Some(_)) => {
-            format!("{by_hand}: if the ball then rolls, do both servos have power?")
+            format!("{by_hand}: if the ball then rolls, look whether both servos have power")
         }
         // The other servo moves the ball unless it is stuck.
         (Some(axis), None) if transition.evidence.axes[axis].command_rad.is_some() => format!(

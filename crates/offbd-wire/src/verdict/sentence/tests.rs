@@ -185,7 +185,7 @@ fn regress_all_candidates_are_named_the_heaviest_first() {
         sentence(&alike),
         "Stuck ball confirmed since 4.50 s: cannot tell stuck ball 50 % from both servos (dead) 50 %; \
          the ball has stood still for 1.5 s while the plate asks it to move; a push by hand would \
-         decide: if the ball then rolls, do both servos have power?"
+         decide: if the ball then rolls, look whether both servos have power"
     );
     let frozen = Candidate { code: FaultCode::Sensor, kind: Some(FaultKind::Frozen), weight: 0.7 };
     let mut readings = failure(FaultCode::Sensor, Some(FaultKind::Frozen), evidence());
