@@ -221,6 +221,29 @@ fn any_changes_are_there_after_a_restart_and_the_file_does_not_grow() {
     }
 }
 
+#[test]
+fn the_disk_gets_back_only_many_free_blocks_at_the_end() {
+    let fixture = Fixture::new();
+    let mut log = fixture.open();
+    let length = || fixture.path.metadata().unwrap().len();
+    let many = batch("a", 1, (SHRINK_BLOCKS * BLOCK) as usize);
+    for batch in [&many, &batch("a", 2, 10), &many, &batch("a", 4, 10)] {
+        log.put(batch).unwrap();
+    }
+    let full = length();
+    log.remove(1).unwrap();
+    log.shrink().unwrap();
+    assert_eq!((length(), contents(&mut log).len()), (full, 3), "batches lie behind them");
+    log.remove(4).unwrap();
+    log.shrink().unwrap();
+    assert_eq!(length(), full, "these are few");
+    log.remove(3).unwrap();
+    log.shrink().unwrap();
+    assert!(length() <= full - SHRINK_BLOCKS * BLOCK, "{} of {full}", length());
+    drop(log);
+    assert_eq!(contents(&mut fixture.open()), [(2, batch("a", 2, 10), false, false)]);
+}
+
 /// As from the database of an earlier version, in any order.
 #[test]
 fn batches_that_are_added_keep_their_ids_and_later_ones_follow() {
