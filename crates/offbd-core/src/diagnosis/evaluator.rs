@@ -417,8 +417,8 @@ impl Evaluator {
 
     /// A ball that stands still although it is asked to move. If it is asked along one
     /// axis only, a dead servo of that axis is a rival cause; evidence from before the
-    /// ball stood decides. If along both, both servos are, as without power, unless they have
-    /// passed their tests or one is known to be broken. In a corner, or at the rim of a disc, the
+    /// ball stood decides. If it is asked along both axes, both servos without power are a rival
+    /// cause, unless they have passed their tests or one is known to be broken. In a corner, or at the rim of a disc, the
     /// ball counts as asked only while the plate pulls it off every rim.
     fn stuck_ball(
         &self,

@@ -306,6 +306,36 @@ mod tests {
         assert!(watch.has_moved, "a gap in the readings does not change it");
     }
 
+    /// Also not after a gap, when the hand has long gone.
+    #[test]
+    fn one_stray_reading_is_not_a_motion() {
+        let mut watch = Stillness::default();
+        (0..200).for_each(|_| watch.update(&reading(Some(0.0), true)));
+        watch.restart();
+        for x in [0.0, 0.05, 0.0, 0.0] {
+            watch.update(&reading(Some(x), true));
+        }
+        assert!(!watch.has_moved);
+    }
+
+    #[test]
+    fn an_axis_that_is_neither_read_nor_asked_to_move_is_not_pressed() {
+        let mut watch = Stillness::default();
+        let both = |y, asked| Reading {
+            position_m: PerAxis { x: Some(0.0), y },
+            asked_m_s2: PerAxis { x: 1.0, y: asked },
+            ..reading(None, true)
+        };
+        (0..100).for_each(|_| watch.update(&both(Some(0.0), 1.0)));
+        let pressed_s = watch.axes.y.pressed_s;
+        assert!(pressed_s > 0.9, "{pressed_s}");
+        watch.update(&both(None, 1.0));
+        assert_eq!(watch.axes.y.pressed_s, pressed_s, "a reading is missing");
+        watch.update(&both(None, 0.0));
+        assert_eq!((watch.axes.y.pressed_s, watch.axes.y.asked_widths), (0.0, 0.0));
+        assert!(watch.axes.x.pressed_s > pressed_s);
+    }
+
     #[test]
     fn a_ball_not_seen_is_counted_in_seconds_and_in_share() {
         let mut watch = Stillness::default();

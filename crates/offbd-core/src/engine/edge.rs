@@ -120,7 +120,7 @@ impl Edge {
 
     /// Takes what the plate demands of the ball at the moment that was taken last: an acceleration of
     /// `pull_m_s2`, of which the ball resists `least_m_s2`.
-    pub(super) fn pull(&mut self, pull_m_s2: &PerAxis<f64>, least_m_s2: f64, dt: f64) {
+    pub(super) fn take_pull(&mut self, pull_m_s2: &PerAxis<f64>, least_m_s2: f64, dt: f64) {
         let takes_off = |place: &PerAxis<f64>| {
             let near =
                 self.places(place).map(|at| self.plate.off_edge(&at, self.room_m, pull_m_s2));
@@ -208,7 +208,7 @@ mod tests {
             let mut edge = Edge::new(rig);
             for moment in &moments(&[place; 3]) {
                 edge.take(moment, 0.1, false);
-                edge.pull(&PerAxis { x: pull, y: 9.0 }, 0.1, 0.1);
+                edge.take_pull(&PerAxis { x: pull, y: 9.0 }, 0.1, 0.1);
             }
             edge.off_rim_s > 0.25
         };

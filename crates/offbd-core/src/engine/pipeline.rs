@@ -362,7 +362,7 @@ impl Pipeline {
             let size = pull_m_s2[a].abs();
             if size > held_m_s2[a] { size } else { 0.0 }
         });
-        self.edge.pull(&pull_m_s2, held_m_s2.x.max(held_m_s2.y), dt);
+        self.edge.take_pull(&pull_m_s2, held_m_s2.x.max(held_m_s2.y), dt);
         self.readings.update(&Reading {
             dt,
             position_m: moment.position,
